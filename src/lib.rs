@@ -1,0 +1,24 @@
+//! Ray tracing of Catmull-Clark subdivision surfaces that tessellates only what rays touch.
+//!
+//! The full tessellation of a film asset does not fit in memory. lazytess keeps the **control mesh**, turns a **patch**
+//! into a **grid** of triangles only when a ray needs it, and keeps grids in a **cache** of fixed size.
+//!
+//! ```text
+//!     OBJ + tags, scene.toml ──io──▶ ControlMesh ──topology──▶ Topology ──subdiv──▶ Surface (patches, plans, bounds)
+//!                                                                                      │ scene::accel
+//!                                                                                      ▼
+//!     camera ──▶ rays ──▶ Intersector { &World, cache pin } ◀── miss: grid::build ──▶ SegmentCache
+//!                               │
+//!                               ▼ Hit
+//!                          Integrator ──▶ Film ──▶ EXR / PNG, statistics
+//! ```
+//!
+//! Modules in reading order: [`mesh`], [`topology`], [`subdiv`], [`grid`], [`cache`], [`scene`], [`render`],
+//! [`image`], [`report`], [`io`], [`cli`].
+
+pub mod error;
+pub mod ids;
+pub mod math;
+pub mod mesh;
+
+pub use error::{Error, Result};

@@ -1,0 +1,3 @@
+//! The lazytess command.
+
+fn main() {}

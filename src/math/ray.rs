@@ -1,0 +1,64 @@
+//! Rays in world space and what they hit.
+
+use crate::ids::{FaceId, MeshId, PatchId};
+use glam::{DVec3, Vec3};
+
+/// One triangle of the tessellation, named so that a ray that starts on it can leave it out.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct PrimitiveRef {
+    /// Which mesh.
+    pub mesh: MeshId,
+    /// Which patch of it.
+    pub patch: PatchId,
+    /// Cell of the patch's grid: `j * n_u + i` for cell (i, j) counted from corner 0, n_u cells along u.
+    pub cell: u32,
+    /// 0: the triangle at the cell's corner (0,0); 1: the one at (1,1).
+    pub half: u8,
+}
+
+/// A ray in world space, from t = 0 to `t_max`.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Origin in world space.
+    pub origin: DVec3,
+    /// Direction in world space; any non-zero length, `t` counts in units of it.
+    pub direction: DVec3,
+    /// Hits beyond are ignored.
+    pub t_max: f32,
+    /// The triangle the ray starts on, if any: it is not hit.
+    pub from: Option<PrimitiveRef>,
+}
+
+impl Ray {
+    /// A ray without end.
+    pub fn new(origin: DVec3, direction: DVec3) -> Self {
+        Self { origin, direction, t_max: f32::INFINITY, from: None }
+    }
+}
+
+/// The nearest hit of a ray, as the tracer returns it. Position and normals are derived from it on demand.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Distance in units of the ray's direction.
+    pub t: f32,
+    /// The triangle.
+    pub primitive: PrimitiveRef,
+    /// Control face of the patch, in file order.
+    pub face: FaceId,
+    /// Which sub-quad of an n-gon; 0 for quads.
+    pub sub: u32,
+    /// Patch parameters in [0,1].
+    pub u: f32,
+    /// See `u`.
+    pub v: f32,
+    /// The triangle's geometric normal in object space (not normalised, along du x dv).
+    pub normal_in_object: Vec3,
+}
+
+/// Whatever can answer ray queries: the lazy tracer, and the brute-force one that tests compare it with.
+pub trait Intersect {
+    /// The nearest hit, ties broken by the smaller (mesh, patch, cell, half).
+    fn closest(&mut self, ray: &Ray) -> Option<Hit>;
+    /// Whether anything is hit.
+    fn occluded(&mut self, ray: &Ray) -> bool;
+}

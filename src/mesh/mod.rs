@@ -1,0 +1,13 @@
+//! The control mesh: what the user gives, validated once.
+//!
+//! A [`ControlMesh`] is plain data: positions, polygons and the tags that shape the limit surface. It knows no
+//! half-edges; [`crate::topology`] derives those.
+//!
+//! # Invariants
+//! Every index is in range, every coordinate and sharpness is finite or (sharpness only) infinite, every face has at least three corners.
+
+mod control_mesh;
+
+pub use control_mesh::{
+    BoundaryRule, ControlMesh, Corner, Crease, CreaseMethod, Edit, EditKind, EditValue, TexCoords, TriangleRule,
+};
