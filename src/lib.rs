@@ -20,5 +20,6 @@ pub mod error;
 pub mod ids;
 pub mod math;
 pub mod mesh;
+pub mod scene;
 
 pub use error::{Error, Result};

@@ -1,0 +1,5 @@
+//! From a description of a scene to a world that can be traced.
+//!
+//! A [`description::SceneDescription`] is what the user wrote, checked but with no mesh read.
+
+pub mod description;
