@@ -1,5 +1,6 @@
 //! Polygons, positions and subdivision tags.
 
+use super::edit::Edit;
 use crate::error::{Error, Result};
 use crate::ids::{FaceId, VertexId};
 use crate::math::DBounds;
@@ -53,43 +54,6 @@ pub struct Corner {
     pub vertex: VertexId,
     /// As in [`Crease`].
     pub sharpness: f32,
-}
-
-/// What a hierarchical edit changes (RISpec 3.2).
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum EditKind {
-    /// `t vertexedit`.
-    Vertex,
-    /// `t edgeedit`.
-    Edge,
-    /// `t faceedit`.
-    Face,
-}
-
-/// The edited quantity.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum EditValue {
-    /// Add to the position at that level.
-    AddPosition(DVec3),
-    /// Replace the position at that level.
-    SetPosition(DVec3),
-    /// Add to the sharpness.
-    AddSharpness(f32),
-    /// Replace the sharpness.
-    SetSharpness(f32),
-    /// Make the face a hole.
-    Hole,
-}
-
-/// A hierarchical edit: a place in the refined mesh and a change to it.
-#[derive(Clone, PartialEq, Debug)]
-pub struct Edit {
-    /// Kind of element.
-    pub kind: EditKind,
-    /// RISpec path: base face, then child indices, the last naming the vertex, edge or (for faces) child.
-    pub path: Vec<u32>,
-    /// The change.
-    pub value: EditValue,
 }
 
 /// Texture coordinates per face corner (`vt`).
@@ -182,7 +146,7 @@ impl ControlMesh {
         if sharpness.any(f32::is_nan) {
             return Err(Error::input("a crease or corner has a sharpness that is not a number"));
         }
-        Ok(())
+        self.edits.iter().try_for_each(|edit| edit.validate(&self.face_sizes))
     }
 
     /// Number of faces.

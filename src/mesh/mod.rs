@@ -7,7 +7,7 @@
 //! Every index is in range, every coordinate and sharpness is finite or (sharpness only) infinite, every face has at least three corners.
 
 mod control_mesh;
+mod edit;
 
-pub use control_mesh::{
-    BoundaryRule, ControlMesh, Corner, Crease, CreaseMethod, Edit, EditKind, EditValue, TexCoords, TriangleRule,
-};
+pub use control_mesh::{BoundaryRule, ControlMesh, Corner, Crease, CreaseMethod, TexCoords, TriangleRule};
+pub use edit::{Edit, EditKind, EditValue};
