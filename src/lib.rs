@@ -18,6 +18,7 @@
 
 pub mod error;
 pub mod ids;
+pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod scene;
