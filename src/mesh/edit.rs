@@ -93,7 +93,7 @@ impl Edit {
     }
 
     /// Checks the path against the base faces' sizes, and the value against the kind.
-    pub(super) fn validate(&self, face_sizes: &[u32]) -> Result<()> {
+    pub fn validate(&self, face_sizes: &[u32]) -> Result<()> {
         let tag = self.tag();
         let min_len = if self.kind == EditKind::Face { 1 } else { 2 };
         if self.path.len() < min_len {

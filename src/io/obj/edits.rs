@@ -17,9 +17,6 @@ use super::tags::{TagArguments, sharpness};
 use crate::mesh::{Edit, EditKind, EditValue};
 use glam::DVec3;
 
-/// Levels below the base face; deeper ones are beyond what f32 can tell apart.
-const MAX_PATH: usize = 32;
-
 #[derive(Clone, Copy)]
 enum Quantity {
     Position,
@@ -129,14 +126,11 @@ fn read_paths(ints: &[u32], shortest: usize) -> Result<Vec<&[u32]>, String> {
     let mut rest = ints;
     while let [length, tail @ ..] = rest {
         let length = *length as usize;
-        if length < shortest || length > MAX_PATH || length > tail.len() {
+        if length < shortest || length > tail.len() {
             let n = tail.len();
-            return Err(format!("path length {length} should be in {shortest}..{MAX_PATH}, and {n} numbers follow it"));
+            return Err(format!("path length {length} should be in {shortest}..={n}: {n} numbers follow it"));
         }
         let (path, after) = tail.split_at(length);
-        if let Some(child) = path.iter().skip(2).find(|&&child| child > 3) {
-            return Err(format!("a path goes to child {child} of a quad, which has 0 to 3"));
-        }
         paths.push(path);
         rest = after;
     }

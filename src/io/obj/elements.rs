@@ -187,16 +187,10 @@ impl MeshBuilder {
         Ok(ObjMesh { mesh: self.mesh, warnings })
     }
 
-    /// The second number of a path is a corner of its face; the ones after it were checked when they were read.
+    /// Paths depend on face sizes, which later lines may give.
     fn check_edit_paths(&self, path: &Path) -> Result<()> {
-        for (edit, &line) in self.mesh.edits.iter().zip(&self.edit_lines) {
-            let n = self.mesh.face_sizes[edit.path[0] as usize];
-            if let Some(corner) = edit.path.get(1).filter(|&&corner| corner >= n) {
-                let message = format!("the edit names corner {corner} of face {}, which has {n}", edit.path[0]);
-                return Err(Error::input(message).at(path, Some(line)));
-            }
-        }
-        Ok(())
+        let mut edits = self.mesh.edits.iter().zip(&self.edit_lines);
+        edits.try_for_each(|(edit, &line)| edit.validate(&self.mesh.face_sizes).map_err(|e| e.at(path, Some(line))))
     }
 }
 
