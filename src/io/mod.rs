@@ -7,5 +7,8 @@
 //! 1. No sequence of bytes makes a reader panic, hang, or allocate more than a small multiple of the file's size.
 //! 2. A file under its final name is complete: it was written under a temporary name beside it and then renamed.
 
+pub mod exr;
 pub mod obj;
+pub mod picture;
+pub mod png;
 pub mod write;

@@ -48,7 +48,7 @@ pub struct RenderDefaults {
     pub spp: Option<u32>,
     /// How light is gathered.
     pub integrator: Option<IntegratorKind>,
-    /// Dicing rate of meshes that name none.
+    /// Dicing rate of meshes that name none; by default `px:1`.
     pub rate: Option<Rate>,
     /// Longest chain of reflections and refractions.
     pub max_depth: Option<u32>,
@@ -65,7 +65,7 @@ pub struct MeshDescription {
     pub world_from_object: DAffine3,
     /// How the surface looks.
     pub material: Material,
-    /// Dicing rate of this mesh, before the scene's and the command line's.
+    /// Dicing rate of this mesh; `None` takes the scene's. The command line's goes before both.
     pub rate: Option<Rate>,
 }
 

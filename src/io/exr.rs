@@ -1,0 +1,137 @@
+//! OpenEXR files: linear colours and named layers.
+
+use super::picture::{ChannelData, ImageLayers, Layer, RgbPicture, check_size};
+use super::write::write_whole;
+use crate::error::Result;
+use ::exr::prelude::*;
+use std::io::{self, BufReader, Read, Seek};
+use std::path::Path;
+
+/// Writes all layers as channels of one part, which every viewer reads: `R`, `G`, `B`, `Z`, `N.X`, ...
+///
+/// Lossless, one thread, no date: equal pictures give equal files.
+pub fn write_exr(path: &Path, picture: &ImageLayers) -> Result<()> {
+    let channels = picture.layers.iter().flat_map(layer_channels).collect();
+    let size = Vec2(picture.width, picture.height);
+    let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::SMALL_FAST_LOSSLESS };
+    let layer = ::exr::image::Layer::new(size, LayerAttributes::default(), encoding, AnyChannels::sort(channels));
+    let image = Image::from_layer(layer);
+    write_whole(path, |out| image.write().non_parallel().to_buffered(out).map_err(io_error))
+}
+
+fn layer_channels(layer: &Layer) -> impl Iterator<Item = AnyChannel<FlatSamples>> {
+    layer.channels.iter().map(|(name, data)| {
+        let full_name = if layer.name.is_empty() { name.clone() } else { format!("{}.{name}", layer.name) };
+        let samples = match data {
+            ChannelData::U32(ids) => FlatSamples::U32(ids.clone()),
+            ChannelData::F32(values) if layer.half => FlatSamples::F16(values.iter().map(|&v| to_half(v)).collect()),
+            ChannelData::F32(values) => FlatSamples::F32(values.clone()),
+        };
+        AnyChannel::new(full_name.as_str(), samples)
+    })
+}
+
+/// The nearest half; finite values stay finite, since one infinite pixel spoils whatever filters the picture.
+fn to_half(value: f32) -> f16 {
+    let limit = f16::MAX.to_f32();
+    f16::from_f32(if value.is_finite() { value.clamp(-limit, limit) } else { value })
+}
+
+fn io_error(error: ::exr::error::Error) -> io::Error {
+    match error {
+        ::exr::error::Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    }
+}
+
+/// The first layer that has channels R, G and B.
+pub(super) fn decode<R: Read + Seek>(mut file: BufReader<R>, n_bytes: u64) -> Result<RgbPicture, String> {
+    let describe = |e: ::exr::error::Error| format!("the EXR file cannot be read: {e}");
+    let meta = MetaData::read_from_buffered(&mut file, false).map_err(describe)?;
+    for header in &meta.headers {
+        let Vec2(width, height) = header.layer_size;
+        check_size(width, height, header.channels.bytes_per_pixel, n_bytes)?;
+    }
+    file.rewind().map_err(|e| format!("the EXR file cannot be read: {e}"))?;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(empty_picture, |picture: &mut RgbPicture, at, (r, g, b): (f32, f32, f32)| {
+            picture.pixels[at.y() * picture.width + at.x()] = [r, g, b];
+        })
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(file)
+        .map_err(describe)?;
+    Ok(image.layer_data.channel_data.pixels)
+}
+
+fn empty_picture(size: Vec2<usize>, _: &RgbChannels) -> RgbPicture {
+    RgbPicture { width: size.width(), height: size.height(), pixels: vec![[0.0; 3]; size.area()] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::picture::read_rgb;
+
+    fn picture() -> ImageLayers {
+        let ramp = |scale: f32| ChannelData::F32((0..6).map(|i| i as f32 * scale).collect());
+        let beauty = Layer {
+            name: String::new(),
+            channels: vec![("R".into(), ramp(0.5)), ("G".into(), ramp(1e6)), ("B".into(), ramp(-0.25))],
+            half: true,
+        };
+        let depth = Layer { name: String::new(), channels: vec![("Z".into(), ramp(0.1))], half: false };
+        let normal = Layer { name: "N".into(), channels: vec![("X".into(), ramp(0.1))], half: false };
+        let ids = ChannelData::U32(vec![0, 1, 2, 3, 16_777_217, u32::MAX]);
+        let id = Layer { name: String::new(), channels: vec![("id".into(), ids)], half: false };
+        ImageLayers { width: 3, height: 2, layers: vec![beauty, depth, normal, id] }
+    }
+
+    #[test]
+    fn layers_come_back_with_their_names_and_types() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        write_exr(&path, &picture()).unwrap();
+        let back = read_all_flat_layers_from_file(&path).unwrap();
+        let channels = &back.layer_data[0].channel_data.list;
+        let kinds: Vec<_> =
+            channels.iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().count())).collect();
+        let expected = ["B", "G", "N.X", "R", "Z", "id"].map(|name| (name.to_owned(), 6));
+        assert_eq!(kinds, expected);
+        assert_eq!(channels[5].sample_data, FlatSamples::U32(vec![0, 1, 2, 3, 16_777_217, u32::MAX]));
+        assert!(matches!(&channels[3].sample_data, FlatSamples::F16(r) if r[3].to_f32() == 1.5));
+        assert!(matches!(&channels[4].sample_data, FlatSamples::F32(z) if z[3] == 0.1 * 3.0));
+    }
+
+    #[test]
+    fn beauty_is_read_as_linear_rgb_and_bright_pixels_stay_finite() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        write_exr(&path, &picture()).unwrap();
+        let back = read_rgb(&path).unwrap();
+        assert_eq!((back.width, back.height), (3, 2));
+        assert_eq!(back.pixels[1], [0.5, 65504.0, -0.25]);
+    }
+
+    #[test]
+    fn equal_pictures_give_equal_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
+        write_exr(&a, &picture()).unwrap();
+        write_exr(&b, &picture()).unwrap();
+        assert_eq!(std::fs::read(a).unwrap(), std::fs::read(b).unwrap());
+    }
+
+    #[test]
+    fn file_without_rgb_is_a_sentence() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("z.exr");
+        let mut depth = picture();
+        depth.layers.remove(0);
+        write_exr(&path, &depth).unwrap();
+        assert!(read_rgb(&path).unwrap_err().to_string().contains("z.exr: the EXR file cannot be read: "));
+    }
+}
