@@ -1,3 +1,16 @@
 //! The lazytess command.
 
-fn main() {}
+use clap::Parser;
+use lazytess::cli::{Cli, describe};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    // Clap prints help to stdout with code 0, and bad usage to stderr with code 2.
+    match Cli::parse().run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{}", describe(&error));
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

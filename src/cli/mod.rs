@@ -1,0 +1,70 @@
+//! The command line: arguments become a validated job, the job runs. No algorithm lives here.
+//!
+//! One file per subcommand with its **arguments** (what was typed; clap's derive makes the help from it), its **job**
+//! (resolved and checked: files named exist, sizes are numbers) and `run`. Results go to stdout for machines,
+//! everything else to stderr. Exit codes: 0 success, 1 a check failed, 2 bad usage or input, 130 interrupted.
+//!
+//! Help lists the flags that change the picture apart from those that only change speed: [`PICTURE`] and [`SPEED`].
+
+pub mod stdout;
+
+use crate::error::{Error, Result};
+use clap::{Parser, Subcommand};
+
+/// Help heading of flags that change what is computed.
+pub const PICTURE: &str = "What the picture shows (these change it)";
+/// Help heading of flags that must not change a byte of the result.
+pub const SPEED: &str = "How it is computed (these never change it)";
+
+/// Ray traces Catmull-Clark subdivision surfaces, tessellating only what rays touch.
+///
+/// A mesh is an OBJ file of polygons, with subdivision tags (creases, corners, holes) in `t` lines if wanted. A scene is
+/// a TOML file that names meshes, materials, lights and a camera. Sizes read like 64M or 2G (binary).
+#[derive(Parser, Debug)]
+#[command(name = "lazytess", version, max_term_width = 110, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {}
+
+impl Cli {
+    /// Does what was asked for.
+    pub fn run(self) -> Result<()> {
+        match self.command {}
+    }
+}
+
+/// The error and its causes for stderr, a line each; causes that the error already quotes are left out.
+pub fn describe(error: &Error) -> String {
+    let mut text = format!("lazytess: {error}");
+    let mut cause = std::error::Error::source(error);
+    while let Some(inner) = cause {
+        let message = inner.to_string();
+        if !text.contains(&message) {
+            text.push_str(&format!("\n  because {message}"));
+        }
+        cause = inner.source();
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn cause_is_told_once() {
+        let cause = std::io::Error::other("no space left");
+        let error = Error::io("write", std::path::Path::new("a.exr"), cause);
+        assert_eq!(describe(&error), "lazytess: cannot write a.exr: no space left");
+    }
+}
