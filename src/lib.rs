@@ -17,6 +17,7 @@
 //! [`image`], [`report`], [`io`], [`cli`].
 
 pub mod cli;
+pub mod cache;
 pub mod error;
 pub mod ids;
 pub mod io;

@@ -1,0 +1,100 @@
+//! Cache-line aligned memory that costs nothing until it is touched.
+#![allow(unsafe_code)]
+
+use std::alloc::{Layout, alloc_zeroed, dealloc};
+use std::ptr::NonNull;
+
+/// Bytes of a cache line, the unit in which blocks are placed.
+pub(super) const LINE: usize = 64;
+
+/// Lines that hold `bytes` bytes.
+pub(super) const fn lines_for(bytes: usize) -> usize {
+    bytes.div_ceil(LINE)
+}
+
+/// Zeroed lines owned by this value and reached through raw pointers only, so that parts of it can be lent out separately.
+pub(super) struct Memory {
+    allocation: Option<(NonNull<u8>, Layout)>,
+    first_line: NonNull<u8>,
+}
+
+// SAFETY: the memory belongs to this value alone; what is read or written through `line` is argued for by its callers.
+unsafe impl Send for Memory {}
+// SAFETY: as above; `&Memory` only gives out a pointer.
+unsafe impl Sync for Memory {}
+
+impl Memory {
+    /// `lines` zeroed lines, or `None` if the system refuses.
+    ///
+    /// Asks for 16-byte alignment and aligns by hand: a larger alignment makes the allocator write the zeros itself,
+    /// which would make every page resident at once.
+    pub(super) fn zeroed(lines: usize) -> Option<Self> {
+        if lines == 0 {
+            return Some(Self { allocation: None, first_line: NonNull::dangling() });
+        }
+        let layout = Layout::from_size_align(lines.checked_add(1)?.checked_mul(LINE)?, 16).ok()?;
+        // SAFETY: the size is not zero.
+        let start = NonNull::new(unsafe { alloc_zeroed(layout) })?;
+        // SAFETY: at most LINE - 1 bytes further, and the allocation has LINE bytes more than `lines` lines.
+        let first_line = unsafe { start.add(start.align_offset(LINE)) };
+        prefer_huge_pages(first_line, lines * LINE);
+        Some(Self { allocation: Some((start, layout)), first_line })
+    }
+
+    /// The address of line `idx`, 64-byte aligned.
+    ///
+    /// # Safety
+    /// `idx` is less than the number of lines.
+    #[inline(always)]
+    pub(super) unsafe fn line(&self, idx: usize) -> *mut u8 {
+        // SAFETY: inside the allocation by the caller's promise.
+        unsafe { self.first_line.as_ptr().add(idx * LINE) }
+    }
+}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        if let Some((start, layout)) = self.allocation {
+            // SAFETY: allocated by `zeroed` with this layout, freed once.
+            unsafe { dealloc(start.as_ptr(), layout) }
+        }
+    }
+}
+
+/// Asks for 2 MiB pages where that cannot make much more memory resident than is used: random blocks then miss the TLB
+/// less often. A refusal changes nothing but speed.
+#[cfg(all(target_os = "linux", not(miri)))]
+fn prefer_huge_pages(start: NonNull<u8>, bytes: usize) {
+    const HUGE_PAGE: usize = 2 << 20;
+    let skipped = start.align_offset(HUGE_PAGE);
+    if skipped < bytes && bytes - skipped >= 8 * HUGE_PAGE {
+        let whole_pages = (bytes - skipped) / HUGE_PAGE * HUGE_PAGE;
+        // SAFETY: whole pages inside our allocation; the advice does not change their contents.
+        unsafe { libc::madvise(start.add(skipped).as_ptr().cast(), whole_pages, libc::MADV_HUGEPAGE) };
+    }
+}
+
+#[cfg(not(all(target_os = "linux", not(miri))))]
+fn prefer_huge_pages(_start: NonNull<u8>, _bytes: usize) {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_aligned_and_zero() {
+        let memory = Memory::zeroed(100).unwrap();
+        for idx in 0..100 {
+            // SAFETY: idx < 100, nobody else knows the memory.
+            let line = unsafe { std::slice::from_raw_parts(memory.line(idx), LINE) };
+            assert_eq!(line.as_ptr().align_offset(LINE), 0);
+            assert!(line.iter().all(|&b| b == 0));
+        }
+    }
+
+    #[test]
+    fn impossible_sizes_are_refused() {
+        assert!(Memory::zeroed(usize::MAX).is_none());
+        assert!(Memory::zeroed(usize::MAX / LINE).is_none());
+    }
+}

@@ -1,0 +1,254 @@
+//! Pins: who may read what. A visit is the time during which a pin stands still.
+#![allow(unsafe_code)]
+
+use super::SegmentCache;
+use super::block::Block;
+use super::scratch::Scratch;
+use super::segment::Ring;
+use super::slot::{Slot, SlotId, SlotTable};
+use super::stats::{CacheStatistics, Counters, count};
+use super::sync::{AtomicU64, AtomicUsize, Ordering, fence};
+use super::word::{Place, first_word_of, without_builder};
+use crossbeam::utils::CachePadded;
+use parking_lot::Mutex;
+use std::marker::PhantomData;
+
+/// The value of a pin word whose thread reads nothing. Ages start at 2.
+const UNPINNED: u64 = 0;
+
+/// The pin words of all threads, where recyclers look.
+pub(super) struct Pins {
+    words: Box<[CachePadded<AtomicU64>]>,
+    free: Mutex<Vec<usize>>,
+    /// Pin words that were ever used: the first so many.
+    n_used: AtomicUsize,
+}
+
+impl Pins {
+    pub(super) fn new(max_threads: usize) -> Self {
+        let words = (0..max_threads).map(|_| CachePadded::new(AtomicU64::new(UNPINNED))).collect();
+        Self { words, free: Mutex::new((0..max_threads).rev().collect()), n_used: AtomicUsize::new(0) }
+    }
+
+    fn take(&self) -> Option<usize> {
+        let idx = self.free.lock().pop()?;
+        self.n_used.fetch_max(idx + 1, Ordering::AcqRel);
+        Some(idx)
+    }
+
+    fn give_back(&self, idx: usize) {
+        self.words[idx].store(UNPINNED, Ordering::Release);
+        self.free.lock().push(idx);
+    }
+
+    /// Whether a pin stands at an age before `age`. `Acquire` orders what that pin's thread read before it moved on
+    /// before everything that follows here: the head's advance and all writes to the recycled segment.
+    pub(super) fn any_before(&self, age: u64) -> bool {
+        let used = &self.words[..self.n_used.load(Ordering::Acquire)];
+        used.iter().map(|word| word.load(Ordering::Acquire)).any(|pin| pin != UNPINNED && pin < age)
+    }
+}
+
+/// A thread's right to read the cache. Neither `Send` nor `Sync`.
+///
+/// A pin that is idle for long should be [released](Pin::release): while it stands still it keeps the cache from
+/// recycling what it could read, and others build blocks for one use only.
+pub struct Pin<'c> {
+    pub(super) cache: &'c SegmentCache,
+    /// The pin word, `None` if there were more pins than expected: such a pin sees an empty cache and leaves it alone.
+    idx: Option<usize>,
+    /// The age at which the pin stands, or [`UNPINNED`].
+    age: u64,
+    /// Slot words from here on are blocks that this pin can read.
+    first_readable: u64,
+    /// Slot words below are blocks that a hit copies to the current segment.
+    first_kept: u64,
+    pub(super) scratch: Scratch,
+    pub(super) counters: Counters,
+    not_send: PhantomData<*const ()>,
+}
+
+impl<'c> Pin<'c> {
+    pub(super) fn new(cache: &'c SegmentCache) -> Self {
+        Self {
+            cache,
+            idx: cache.pins.take(),
+            age: UNPINNED,
+            first_readable: u64::MAX,
+            first_kept: 0,
+            scratch: Scratch::default(),
+            counters: Counters::default(),
+            not_send: PhantomData,
+        }
+    }
+
+    /// Begins a visit: moves the pin to the current age. Costs one load and two comparisons unless a segment was
+    /// recycled since the last visit.
+    #[inline]
+    pub fn visit(&mut self) -> Visit<'_> {
+        self.scratch.clear();
+        if self.cache.ring.head() != self.age {
+            self.move_to_head();
+        }
+        Visit { pin: self }
+    }
+
+    /// Lets go of everything until the next visit.
+    pub fn release(&mut self) {
+        self.scratch.clear();
+        self.age = UNPINNED;
+        self.first_readable = u64::MAX;
+        if let Some(idx) = self.idx {
+            // `Release`: what was read is read before a recycler sees the pin gone.
+            self.cache.pins.words[idx].store(UNPINNED, Ordering::Release);
+        }
+    }
+
+    /// What this pin has counted so far.
+    pub fn statistics(&self) -> CacheStatistics {
+        self.counters.statistics()
+    }
+
+    /// Announces the head's age and makes sure that the announcement was in time (invariant 4). Each further round means
+    /// that the head has moved, and once a recycler has seen the pin the head can move only a few segments more.
+    #[cold]
+    fn move_to_head(&mut self) {
+        let ring = &self.cache.ring;
+        let mut age = ring.head();
+        let Some(idx) = self.idx else {
+            self.age = age;
+            return;
+        };
+        loop {
+            self.cache.pins.words[idx].store(age, Ordering::Release);
+            fence(Ordering::SeqCst);
+            match ring.head() {
+                head if head == age => break,
+                head => age = head,
+            }
+        }
+        self.age = age;
+        self.first_readable = first_word_of(ring.oldest_readable(age));
+        self.first_kept = if self.cache.reinsert { first_word_of(ring.oldest_kept(age)) } else { 0 };
+    }
+}
+
+impl Drop for Pin<'_> {
+    fn drop(&mut self) {
+        if let Some(idx) = self.idx {
+            self.cache.pins.give_back(idx);
+        }
+        *self.cache.totals.lock() += self.counters.statistics();
+    }
+}
+
+/// The time between two moves of a pin. Every block handed out stays as it is until the visit ends.
+///
+/// A visit should be short, the time of one ray: what it builds beyond the free part of the cache is kept in private
+/// memory until it ends.
+pub struct Visit<'p> {
+    pub(super) pin: &'p Pin<'p>,
+}
+
+impl<'p> Visit<'p> {
+    /// The slot `id` of a table.
+    ///
+    /// # Panics
+    /// If there is no such slot.
+    #[inline(always)]
+    pub fn root<'v>(&'v self, table: &'v SlotTable, id: SlotId) -> Slot<'v> {
+        table.slot(id)
+    }
+
+    /// The block of a slot if it is there. Otherwise [`Visit::claim`] the slot.
+    ///
+    /// # Panics
+    /// If the slot belongs to another cache.
+    #[inline]
+    pub fn get<'v>(&'v self, slot: Slot<'v>) -> Option<Block<'v>> {
+        let word = slot.word_in(self.tag());
+        // `Acquire` pairs with the `Release` of the publication: the block's bytes are seen.
+        let seen = word.load(Ordering::Acquire);
+        if !self.can_read(seen) {
+            return None;
+        }
+        count(&self.pin.counters.hits);
+        // SAFETY: just seen with `Acquire` and readable.
+        Some(if seen < self.pin.first_kept { self.reinsert(word, seen) } else { unsafe { self.block(seen) } })
+    }
+
+    /// Hints that the block of a slot will be asked for soon.
+    #[inline(always)]
+    pub fn prefetch(&self, slot: Slot<'_>) {
+        let seen = slot.word_in(self.tag()).load(Ordering::Relaxed);
+        if self.can_read(seen) {
+            self.ring().prefetch(Place::decode(seen));
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn ring(&self) -> &Ring {
+        &self.pin.cache.ring
+    }
+
+    #[inline(always)]
+    pub(super) fn tag(&self) -> super::slot::Tag<'_> {
+        self.pin.cache.tag.tag()
+    }
+
+    /// Whether a slot word is a block that this visit may read.
+    #[inline(always)]
+    pub(super) fn can_read(&self, word: u64) -> bool {
+        word >= self.pin.first_readable
+    }
+
+    /// Whether the pin has no pin word, so that it must neither read nor write the cache.
+    pub(super) fn is_outsider(&self) -> bool {
+        self.pin.idx.is_none()
+    }
+
+    /// The block that a slot word stands for.
+    ///
+    /// # Safety
+    /// [`Visit::can_read`] the word, which was seen with `Acquire` in a slot of this cache or written by this thread.
+    #[inline(always)]
+    pub(super) unsafe fn block(&self, word: u64) -> Block<'_> {
+        let place = Place::decode(word);
+        let ring = self.ring();
+        // SAFETY: the place was reserved in this ring, its block is complete by the caller's promise, and its segment
+        // is not recycled while this visit borrows the pin (invariant 3).
+        let (bytes, words) = unsafe { (ring.bytes(place), ring.words(place)) };
+        Block {
+            bytes,
+            words,
+            tag: self.tag(),
+            #[cfg(loom)]
+            shared: Some((ring, place)),
+        }
+    }
+
+    /// Copies a block that will soon be recycled to the current segment, together with what is known of its children.
+    /// What another thread publishes in the old copy meanwhile is lost, and built again when wanted.
+    #[cold]
+    fn reinsert<'v>(&'v self, word: &'v AtomicU64, seen: u64) -> Block<'v> {
+        // SAFETY: seen with `Acquire` and readable, says the only caller.
+        let old = unsafe { self.block(seen) };
+        let Place { lines, word_lines, .. } = Place::decode(seen);
+        let Ok(place) = self.ring().reserve(lines, word_lines, &self.pin.cache.pins) else { return old };
+        // SAFETY: just reserved.
+        unsafe { self.ring().write(place, old.bytes.len(), super::word::EMPTY, |out| out.copy_from_slice(old.bytes)) };
+        // SAFETY: just written by this thread.
+        let new = unsafe { self.block(place.encode()) };
+        for (new, old) in new.words.iter().zip(old.words) {
+            // `Acquire`, so that who sees the new parent's publication sees the children's bytes, too.
+            new.store(without_builder(old.load(Ordering::Acquire)), Ordering::Relaxed);
+        }
+        match word.compare_exchange(seen, place.encode(), Ordering::Release, Ordering::Relaxed) {
+            Ok(_) => {
+                count(&self.pin.counters.reinsertions);
+                new
+            }
+            Err(_) => old,
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Atomics: the real ones, or loom's, which explore every interleaving (`.ci/loom.sh`).
+
+#[cfg(not(loom))]
+pub(super) use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering, fence};
+
+#[cfg(loom)]
+pub(super) use loom::sync::atomic::{AtomicU64, AtomicUsize, Ordering, fence};
