@@ -24,5 +24,7 @@ pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod scene;
+pub mod subdiv;
+pub mod topology;
 
 pub use error::{Error, Result};

@@ -1,0 +1,367 @@
+//! From patches to lattice vertices: rates, shared borders, and boxes of parts that are not tessellated yet.
+//!
+//! The **rate** of an edge is the number of segments it is cut into; it belongs to the edge, so both faces agree. A patch
+//! has `n_u x n_v` cells, the larger of opposite rates; where a side is coarser than that, its border vertices snap to the
+//! nearest of the edge's points, and the border becomes the edge's own polyline.
+//!
+//! Neighbours evaluate a shared point from different rings, and their f64 results differ in the last bits. Both round to
+//! the lattice. Only where a coordinate is within [`GUARD`] of a rounding boundary could they disagree, and there both ask
+//! the same **owner** (of the edge or vertex) and take its rounded value. If one side sees the point inside the guard and
+//! the other just outside, they still agree: the owner's value lies within the evaluation error, far less than the
+//! guard, of one that is a whole guard away from the boundary.
+
+use super::eval::{Evaluator, Point, SurfaceSample};
+use super::surface::{PatchPoints, Surface};
+use crate::ids::{FaceId, PatchId};
+use crate::math::Bounds;
+use crate::topology::HalfEdges;
+use glam::{DVec3, Vec3};
+
+/// Distance from a rounding boundary, in lattice steps, within which border points are computed by their owner.
+///
+/// Evaluation errors stay below 2^-21: coordinates are below 2^23, so that one f64 operation errs by at most 2^-30, and a
+/// walk of 30 levels sums about 20 terms each. The fuzz tests measure less than 2^-24. Larger guards cost owner
+/// evaluations (6 GUARD of all border points), smaller ones lose the margin.
+pub const GUARD: f64 = 1.0 / 65536.0;
+
+/// Added before rounding: mesh coordinates are often dyadic fractions, whose halves would lie on rounding boundaries all
+/// the time; a third is far from all of them.
+pub const LATTICE_SHIFT: f64 = 1.0 / 3.0;
+
+/// Largest rate of an edge.
+pub const MAX_RATE: u32 = 4096;
+
+/// How finely a patch is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PatchRates {
+    /// Segments of the sides v = 0, u = 1, v = 1, u = 0.
+    pub sides: [u32; 4],
+    /// Cells along u.
+    pub n_u: u32,
+    /// Cells along v.
+    pub n_v: u32,
+}
+
+impl PatchRates {
+    fn new(sides: [u32; 4]) -> Self {
+        Self { sides, n_u: sides[0].max(sides[2]), n_v: sides[1].max(sides[3]) }
+    }
+
+    /// Triangles of the patch's grid.
+    pub fn n_triangles(&self) -> u64 {
+        2 * u64::from(self.n_u) * u64::from(self.n_v)
+    }
+}
+
+impl Surface {
+    /// The rates of a patch, from `rate(a, b)`: the segments for an edge between two points of object space, symmetric in
+    /// them. Edges beside a polygon that is no quad are cut evenly, since the polygon's patches meet in their middle.
+    pub fn patch_rates(&self, patch: PatchId, rate: &impl Fn(DVec3, DVec3) -> u32) -> PatchRates {
+        let (face, sub) = self.face_of(patch);
+        let (first, n) = self.topology().face_corners(face.0);
+        if n == 4 {
+            return PatchRates::new(std::array::from_fn(|k| self.edge_rate(first + k as u32, rate)));
+        }
+        let before = (sub + n - 1) % n;
+        let half = |k: u32| self.edge_rate(first + k, rate) / 2;
+        PatchRates::new([
+            half(sub),
+            self.inner_rate(face, sub, rate),
+            self.inner_rate(face, before, rate),
+            half(before),
+        ])
+    }
+
+    fn edge_rate(&self, h: u32, rate: &impl Fn(DVec3, DVec3) -> u32) -> u32 {
+        let [a, b] = [h, self.topology().next(h)].map(|h| self.object_point(self.topology().vertex(h)));
+        let r = rate(a, b).clamp(1, MAX_RATE);
+        if self.topology().touches_polygon(h) { r.next_multiple_of(2) } else { r }
+    }
+
+    /// The rate from the middle of edge `k` of a polygon to its centre: half that of twice the way.
+    fn inner_rate(&self, face: FaceId, k: u32, rate: &impl Fn(DVec3, DVec3) -> u32) -> u32 {
+        let (first, n) = self.topology().face_corners(face.0);
+        let corner = |k: u32| self.object_point(self.topology().vertex(first + k % n));
+        let center = (0..n).map(corner).sum::<DVec3>() / f64::from(n);
+        let middle = 0.5 * (corner(k) + corner(k + 1));
+        rate(middle, middle + 2.0 * (center - middle)).clamp(1, MAX_RATE).div_ceil(2)
+    }
+
+    /// A control point in object space.
+    pub fn object_point(&self, vertex: u32) -> DVec3 {
+        self.lattice().to_object(self.control_point(vertex).to_vec())
+    }
+
+    /// The object-space position of a lattice vertex.
+    pub fn object_from_lattice(&self, vertex: DVec3) -> DVec3 {
+        self.lattice().to_object(vertex - LATTICE_SHIFT)
+    }
+}
+
+/// Turns parts of patches into lattice vertices. Holds scratch memory and the last patch: keep one per thread.
+#[derive(Debug, Default)]
+pub struct Dicer {
+    points: PatchPoints,
+    evaluator: Evaluator,
+    out: Vec<Point>,
+    owner: OwnerScratch,
+}
+
+#[derive(Debug, Default)]
+struct OwnerScratch {
+    points: PatchPoints,
+    evaluator: Evaluator,
+}
+
+/// A lattice coordinate, and whether it was within the guard of the next one.
+#[inline(always)]
+fn round(x: f64) -> (i32, bool) {
+    let shifted = x + (LATTICE_SHIFT + 0.5);
+    let floor = shifted.floor();
+    let fraction = shifted - floor;
+    (floor as i32, !(GUARD..=1.0 - GUARD).contains(&fraction))
+}
+
+#[inline(always)]
+fn round_point(p: Point) -> ([i32; 3], bool) {
+    let (x, y, z) = (round(p.0[0]), round(p.0[1]), round(p.0[2]));
+    ([x.0, y.0, z.0], x.1 | y.1 | z.1)
+}
+
+/// A side of a patch: which, and the index of a point on it out of `rate`, counted along increasing u or v.
+#[derive(Clone, Copy)]
+struct SidePoint {
+    side: usize,
+    index: u32,
+    rate: u32,
+}
+
+impl SidePoint {
+    fn uv(&self) -> (f64, f64) {
+        let t = f64::from(self.index) / f64::from(self.rate);
+        match self.side {
+            0 => (t, 0.0),
+            1 => (1.0, t),
+            2 => (t, 1.0),
+            _ => (0.0, t),
+        }
+    }
+}
+
+/// The edge point that border vertex `i` of `n` snaps to where the side has only `rate` segments.
+fn snapped(i: u32, n: u32, rate: u32) -> u32 {
+    ((2 * u64::from(i) * u64::from(rate) + u64::from(n)) / (2 * u64::from(n))) as u32
+}
+
+impl Dicer {
+    /// The lattice vertices `i0..=i1` by `j0..=j1` of a patch's grid, i fastest, appended to a cleared `out`.
+    pub fn dice(
+        &mut self,
+        surface: &Surface,
+        patch: PatchId,
+        rates: &PatchRates,
+        [i0, i1]: [u32; 2],
+        [j0, j1]: [u32; 2],
+        out: &mut Vec<[i32; 3]>,
+    ) {
+        surface.load(patch, &mut self.points);
+        let (n_i, n_j) = ((i1 - i0 + 1) as usize, (j1 - j0 + 1) as usize);
+        self.out.clear();
+        self.out.resize(n_i * n_j, Point::ZERO);
+        let (n_u, n_v) = (f64::from(rates.n_u), f64::from(rates.n_v));
+        let us = (i0..=i1).map(|i| f64::from(i) / n_u);
+        let vs = (j0..=j1).map(|j| f64::from(j) / n_v);
+        surface.grid(&self.points, &mut self.evaluator, us, vs, &mut self.out);
+        out.clear();
+        out.extend(self.out.iter().map(|&p| round_point(p).0));
+        for (side, at, end) in [(0, j0, 0), (2, j1, rates.n_v)] {
+            if at == end {
+                let row = if side == 0 { 0 } else { n_j - 1 } * n_i;
+                for i in i0..=i1 {
+                    let k = row + (i - i0) as usize;
+                    out[k] = self.border_vertex(surface, patch, rates, side, i, rates.n_u, self.out[k]);
+                }
+            }
+        }
+        for (side, at, end) in [(3, i0, 0), (1, i1, rates.n_u)] {
+            if at == end {
+                let column = if side == 3 { 0 } else { n_i - 1 };
+                for j in j0..=j1 {
+                    let k = (j - j0) as usize * n_i + column;
+                    out[k] = self.border_vertex(surface, patch, rates, side, j, rates.n_v, self.out[k]);
+                }
+            }
+        }
+    }
+
+    /// Border vertex `i` of `n` on a side, given its evaluated position.
+    #[allow(clippy::too_many_arguments)]
+    fn border_vertex(
+        &mut self,
+        surface: &Surface,
+        patch: PatchId,
+        rates: &PatchRates,
+        side: usize,
+        i: u32,
+        n: u32,
+        evaluated: Point,
+    ) -> [i32; 3] {
+        let rate = rates.sides[side];
+        let at = SidePoint { side, index: if rate == n { i } else { snapped(i, n, rate) }, rate };
+        let p = if rate == n {
+            evaluated
+        } else {
+            let (u, v) = at.uv();
+            self.point(surface, u, v)
+        };
+        match round_point(p) {
+            (vertex, false) => vertex,
+            _ => self.owner.side_point(surface, patch, rates, at),
+        }
+    }
+
+    fn point(&mut self, surface: &Surface, u: f64, v: f64) -> Point {
+        let mut p = [Point::ZERO];
+        surface.grid(&self.points, &mut self.evaluator, [u], [v], &mut p);
+        p[0]
+    }
+
+    /// Position and tangents at a point of a patch, in lattice units without [`LATTICE_SHIFT`].
+    pub fn sample(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> SurfaceSample {
+        surface.load(patch, &mut self.points);
+        surface.sample(&self.points, &mut self.evaluator, u, v)
+    }
+
+    /// The limit normal in object space, not normalised; zero where there is none.
+    pub fn normal(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> DVec3 {
+        surface.load(patch, &mut self.points);
+        surface.normal(&self.points, &mut self.evaluator, u, v)
+    }
+
+    /// A box that holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing; `depth` more
+    /// splits towards irregular corners make it tighter.
+    pub fn bounds(
+        &mut self,
+        surface: &Surface,
+        patch: PatchId,
+        rates: &PatchRates,
+        i: [u32; 2],
+        j: [u32; 2],
+        depth: u32,
+    ) -> Bounds {
+        surface.load(patch, &mut self.points);
+        let range = |[a, b]: [u32; 2], n: u32| [f64::from(a) / f64::from(n), f64::from(b) / f64::from(n)];
+        let (u, v) = (range(i, rates.n_u), range(j, rates.n_v));
+        let mut bounds = surface.bounds(&self.points, &mut self.evaluator, u, v, depth);
+        let snap = |[a, b]: [u32; 2], n: u32, r: u32| range([snapped(a, n, r), snapped(b, n, r)], r);
+        for side in 0..4 {
+            let (touches, n, along) = match side {
+                0 => (j[0] == 0, rates.n_u, i),
+                1 => (i[1] == rates.n_u, rates.n_v, j),
+                2 => (j[1] == rates.n_v, rates.n_u, i),
+                _ => (i[0] == 0, rates.n_v, j),
+            };
+            let rate = rates.sides[side];
+            if touches && rate < n {
+                let t = snap(along, n, rate);
+                let (u, v) = match side {
+                    0 => (t, [0.0; 2]),
+                    1 => ([1.0; 2], t),
+                    2 => (t, [1.0; 2]),
+                    _ => ([0.0; 2], t),
+                };
+                bounds = bounds.union(surface.bounds(&self.points, &mut self.evaluator, u, v, depth));
+            }
+        }
+        to_lattice_box(bounds.min, bounds.max)
+    }
+
+    /// As [`bounds`](Self::bounds) for a whole patch at any rates.
+    pub fn patch_bounds(&mut self, surface: &Surface, patch: PatchId, depth: u32) -> Bounds {
+        surface.load(patch, &mut self.points);
+        let b = surface.bounds(&self.points, &mut self.evaluator, [0.0, 1.0], [0.0, 1.0], depth);
+        to_lattice_box(b.min, b.max)
+    }
+}
+
+/// Rounds outwards to lattice points, by what rounding a vertex can move it and a little for evaluation errors. The
+/// result is exact in f32, since lattice coordinates stay below 2^24.
+fn to_lattice_box(min: DVec3, max: DVec3) -> Bounds {
+    let down = |x: f64| (x + LATTICE_SHIFT - 0.51).floor() as f32;
+    let up = |x: f64| (x + LATTICE_SHIFT + 0.51).ceil() as f32;
+    Bounds { min: Vec3::new(down(min.x), down(min.y), down(min.z)), max: Vec3::new(up(max.x), up(max.y), up(max.z)) }
+}
+
+impl OwnerScratch {
+    fn side_point(&mut self, surface: &Surface, patch: PatchId, rates: &PatchRates, at: SidePoint) -> [i32; 3] {
+        let (face, sub) = surface.face_of(patch);
+        let (first, n) = surface.topology().face_corners(face.0);
+        let SidePoint { side, index, rate } = at;
+        if n == 4 {
+            let along = if side < 2 { index } else { rate - index };
+            return self.edge_point(surface, first + side as u32, along, rate);
+        }
+        let before = (sub + n - 1) % n;
+        match side {
+            0 => self.edge_point(surface, first + sub, index, 2 * rate),
+            3 => self.edge_point(surface, first + before, 2 * rate - index, 2 * rate),
+            1 => self.inner_point(surface, face, sub, index, rate, rates.sides[0]),
+            _ => self.inner_point(surface, face, before, index, rate, rates.sides[3]),
+        }
+    }
+
+    /// Point `index` of `rate` along half-edge `h`, in the name of the edge's owner.
+    fn edge_point(&mut self, surface: &Surface, h: u32, index: u32, rate: u32) -> [i32; 3] {
+        let topology = surface.topology();
+        if index == 0 || index == rate {
+            return self.vertex(surface, if index == 0 { h } else { topology.next(h) });
+        }
+        let owner = topology.edge_owner(h);
+        let index = if topology.vertex(owner) == topology.vertex(h) { index } else { rate - index };
+        let face = FaceId(topology.face(owner));
+        let (first, n) = topology.face_corners(face.0);
+        let k = owner - first;
+        if n == 4 {
+            let index = if k < 2 { index } else { rate - index };
+            let (u, v) = SidePoint { side: k as usize, index, rate }.uv();
+            return self.point(surface, surface.patch_of(face, 0), u, v);
+        }
+        let half = rate / 2;
+        if index <= half {
+            self.point(surface, surface.patch_of(face, k), f64::from(index) / f64::from(half), 0.0)
+        } else {
+            let t = f64::from(rate - index) / f64::from(half);
+            self.point(surface, surface.patch_of(face, (k + 1) % n), 0.0, t)
+        }
+    }
+
+    /// Point `index` of `rate` from the middle of a polygon's edge `k`, itself cut into `2 half` segments, to its centre.
+    fn inner_point(&mut self, surface: &Surface, face: FaceId, k: u32, index: u32, rate: u32, half: u32) -> [i32; 3] {
+        let (first, _) = surface.topology().face_corners(face.0);
+        if index == 0 {
+            self.edge_point(surface, first + k, half, 2 * half)
+        } else if index == rate {
+            self.point(surface, surface.patch_of(face, 0), 1.0, 1.0)
+        } else {
+            self.point(surface, surface.patch_of(face, k), 1.0, f64::from(index) / f64::from(rate))
+        }
+    }
+
+    fn vertex(&mut self, surface: &Surface, h: u32) -> [i32; 3] {
+        let topology = surface.topology();
+        let owner = topology.vertex_owner(h);
+        let face = FaceId(topology.face(owner));
+        let (first, n) = topology.face_corners(face.0);
+        let k = owner - first;
+        let (sub, corner) = if n == 4 { (0, k) } else { (k, 0) };
+        let (u, v) = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][corner as usize];
+        self.point(surface, surface.patch_of(face, sub), u, v)
+    }
+
+    fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> [i32; 3] {
+        surface.load(patch, &mut self.points);
+        let mut p = [Point::ZERO];
+        surface.grid(&self.points, &mut self.evaluator, [u], [v], &mut p);
+        round_point(p[0]).0
+    }
+}

@@ -1,0 +1,420 @@
+//! Walking down plans: grids of points, single samples with tangents, and conservative boxes.
+
+use super::plan::{Child, Limit, NodeId, Plan, PlanLibrary, SparseRows};
+use super::regular::{self, ControlPoints};
+use crate::math::DBounds;
+use glam::DVec3;
+use std::ops::{Add, Mul, Sub};
+
+/// A point in lattice space, padded to four lanes so that sums compile to vector instructions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(32))]
+pub struct Point(pub [f64; 4]);
+
+impl Point {
+    /// The origin.
+    pub const ZERO: Self = Point([0.0; 4]);
+
+    /// From coordinates.
+    #[inline(always)]
+    pub fn new(x: f64, y: f64, z: f64) -> Self {
+        Point([x, y, z, 0.0])
+    }
+
+    /// Largest absolute coordinate.
+    pub fn max_abs(self) -> f64 {
+        self.0.iter().fold(0.0, |m, x| m.max(x.abs()))
+    }
+
+    /// As a glam vector.
+    #[inline(always)]
+    pub fn to_vec(self) -> DVec3 {
+        DVec3::new(self.0[0], self.0[1], self.0[2])
+    }
+}
+
+impl Add for Point {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Point(std::array::from_fn(|k| self.0[k] + o.0[k]))
+    }
+}
+
+impl Sub for Point {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Point(std::array::from_fn(|k| self.0[k] - o.0[k]))
+    }
+}
+
+impl Mul<f64> for Point {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, s: f64) -> Self {
+        Point(std::array::from_fn(|k| self.0[k] * s))
+    }
+}
+
+/// What the derivatives of a sample are.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum SampleKind {
+    /// Derivatives with respect to u and v.
+    Regular,
+    /// Unit tangents at a smooth extraordinary vertex, where derivatives do not exist.
+    Extraordinary,
+    /// None are defined.
+    PositionOnly,
+}
+
+/// A point of the limit surface in lattice units.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceSample {
+    /// Position.
+    pub position: DVec3,
+    /// Derivative or unit tangent along u; zero if not defined.
+    pub du: DVec3,
+    /// Derivative or unit tangent along v.
+    pub dv: DVec3,
+    /// Which of these they are.
+    pub kind: SampleKind,
+}
+
+/// A sub-square is taken for its corner beyond this many splits: f64 parameters end there.
+const MAX_DEPTH: u32 = 52;
+
+/// Evaluates one patch at a time. Holds scratch memory, so keep one per thread.
+#[derive(Debug, Default)]
+pub struct Evaluator {
+    /// Ring points of all levels of the current walk, a stack.
+    points: Vec<Point>,
+    /// Basis function values of a regular part, for u then v.
+    basis: Vec<[f64; 4]>,
+    /// Parameters of all levels, a stack.
+    params: Vec<f64>,
+}
+
+/// A rectangle of a tensor grid of parameters, and where its points go.
+#[derive(Clone, Copy)]
+struct Target {
+    /// Ranges in `Evaluator::params`.
+    us: (usize, usize),
+    vs: (usize, usize),
+    /// Index of the first point and distance between rows in the output.
+    first: usize,
+    stride: usize,
+}
+
+#[inline(always)]
+fn product(rows: &SparseRows, i: usize, points: &[Point]) -> Point {
+    let (columns, weights) = rows.row(i);
+    let mut sum = Point::ZERO;
+    for (&c, &w) in columns.iter().zip(weights) {
+        sum = sum + points[c as usize] * w;
+    }
+    sum
+}
+
+fn control_points(rows: &SparseRows, points: &[Point]) -> ControlPoints {
+    std::array::from_fn(|k| product(rows, k, points))
+}
+
+/// Where a polygon's child or a quad's quarter lies: its corner in units of its size.
+fn quarter(k: usize) -> (f64, f64) {
+    [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][k]
+}
+
+fn exact_corner(u: f64, v: f64) -> Option<usize> {
+    match (u, v) {
+        (0.0, 0.0) => Some(0),
+        (1.0, 0.0) => Some(1),
+        (1.0, 1.0) => Some(2),
+        (0.0, 1.0) => Some(3),
+        _ => None,
+    }
+}
+
+impl Evaluator {
+    /// Positions at all pairs of `us` and `vs` (each ascending, in [0,1]) of the patch that starts at `node` with ring
+    /// points `ring`; `out[j * us.len() + i]` is at `(us[i], vs[j])`.
+    pub fn grid(
+        &mut self,
+        library: &PlanLibrary,
+        node: NodeId,
+        ring: &[Point],
+        us: impl IntoIterator<Item = f64>,
+        vs: impl IntoIterator<Item = f64>,
+        out: &mut [Point],
+    ) {
+        self.points.clear();
+        self.points.extend_from_slice(ring);
+        self.params.clear();
+        self.params.extend(us);
+        let n_u = self.params.len();
+        self.params.extend(vs);
+        let n = self.params.len();
+        let target = Target { us: (0, n_u), vs: (n_u, n), first: 0, stride: n_u };
+        self.walk(library, node, 0, 0, target, out);
+    }
+
+    /// As [`grid`](Self::grid) for 16 B-spline control points.
+    pub fn regular_grid(
+        &mut self,
+        control: &ControlPoints,
+        us: impl IntoIterator<Item = f64>,
+        vs: impl IntoIterator<Item = f64>,
+        out: &mut [Point],
+    ) {
+        self.params.clear();
+        self.params.extend(us);
+        let n_u = self.params.len();
+        self.params.extend(vs);
+        let target = Target { us: (0, n_u), vs: (n_u, self.params.len()), first: 0, stride: n_u };
+        self.regular(control, target, out);
+    }
+
+    fn walk(
+        &mut self,
+        library: &PlanLibrary,
+        node: NodeId,
+        ring: usize,
+        depth: u32,
+        target: Target,
+        out: &mut [Point],
+    ) {
+        let (rows, children, limits) = match library.plan(node) {
+            Plan::Regular(rows) => {
+                let control = control_points(rows, &self.points[ring..]);
+                return self.regular(&control, target, out);
+            }
+            Plan::Split { rows, children, limits, .. } => (rows, children, limits),
+        };
+        let single = target.us.1 - target.us.0 == 1 && target.vs.1 - target.vs.0 == 1;
+        if single || depth >= MAX_DEPTH {
+            let (u, v) = (self.params[target.us.0], self.params[target.vs.0]);
+            let corner = if depth >= MAX_DEPTH { exact_corner(u.round(), v.round()) } else { exact_corner(u, v) };
+            if let Some(limit) = corner.and_then(|k| limits.get(k)) {
+                if let Limit::Position(rows) | Limit::Smooth(rows) = limit {
+                    let p = product(rows, 0, &self.points[ring..]);
+                    self.fill(target, p, out);
+                    return;
+                }
+            }
+        }
+        let refined = self.refine(rows, ring);
+        let marks = (self.points.len(), self.params.len());
+        let split = |params: &[f64], (a, b): (usize, usize)| a + params[a..b].partition_point(|&t| t < 0.5);
+        let (mid_u, mid_v) = (split(&self.params, target.us), split(&self.params, target.vs));
+        for (k, child) in children.iter().enumerate() {
+            let (x, y) = quarter(k);
+            let us = if x == 0.0 { (target.us.0, mid_u) } else { (mid_u, target.us.1) };
+            let vs = if y == 0.0 { (target.vs.0, mid_v) } else { (mid_v, target.vs.1) };
+            if us.0 == us.1 || vs.0 == vs.1 {
+                continue;
+            }
+            let first = target.first + (us.0 - target.us.0) + (vs.0 - target.vs.0) * target.stride;
+            let us = self.push_params(us, x);
+            let vs = self.push_params(vs, y);
+            let child_ring = self.push_child(child, refined);
+            self.walk(library, child.node, child_ring, depth + 1, Target { us, vs, first, stride: target.stride }, out);
+            self.points.truncate(marks.0);
+            self.params.truncate(marks.1);
+        }
+        self.points.truncate(refined);
+    }
+
+    fn fill(&self, target: Target, p: Point, out: &mut [Point]) {
+        for j in 0..target.vs.1 - target.vs.0 {
+            let row = target.first + j * target.stride;
+            out[row..row + target.us.1 - target.us.0].fill(p);
+        }
+    }
+
+    /// Pushes the refined points; returns where they start.
+    fn refine(&mut self, rows: &SparseRows, ring: usize) -> usize {
+        let start = self.points.len();
+        for i in 0..rows.len() {
+            let p = product(rows, i, &self.points[ring..start]);
+            self.points.push(p);
+        }
+        start
+    }
+
+    fn push_child(&mut self, child: &Child, refined: usize) -> usize {
+        let start = self.points.len();
+        for &p in &child.points {
+            let p = self.points[refined + p as usize];
+            self.points.push(p);
+        }
+        start
+    }
+
+    /// Pushes parameters as a quarter sees them; exact in floating point.
+    fn push_params(&mut self, (a, b): (usize, usize), offset: f64) -> (usize, usize) {
+        let start = self.params.len();
+        for i in a..b {
+            let t = 2.0 * self.params[i] - offset;
+            self.params.push(t);
+        }
+        (start, self.params.len())
+    }
+
+    fn regular(&mut self, control: &ControlPoints, target: Target, out: &mut [Point]) {
+        self.basis.clear();
+        self.basis.extend(self.params[target.us.0..target.us.1].iter().map(|&u| regular::basis(u)));
+        let n_u = self.basis.len();
+        for (j, v) in (target.vs.0..target.vs.1).enumerate() {
+            let columns = regular::columns(control, &regular::basis(self.params[v]));
+            let row = &mut out[target.first + j * target.stride..][..n_u];
+            for (p, b) in row.iter_mut().zip(&self.basis) {
+                *p = regular::combine(b, columns);
+            }
+        }
+    }
+
+    /// Position and tangents at one point.
+    pub fn sample(&mut self, library: &PlanLibrary, node: NodeId, ring: &[Point], u: f64, v: f64) -> SurfaceSample {
+        self.points.clear();
+        self.points.extend_from_slice(ring);
+        let (mut node, mut ring, mut u, mut v) = (node, 0, u, v);
+        let mut scale = 1.0;
+        for depth in 0.. {
+            match library.plan(node) {
+                Plan::Regular(rows) => {
+                    return regular_sample(&control_points(rows, &self.points[ring..]), u, v, scale);
+                }
+                Plan::Split { rows, children, limits, .. } => {
+                    let corner =
+                        if depth < MAX_DEPTH { exact_corner(u, v) } else { exact_corner(u.round(), v.round()) };
+                    let limit = corner.and_then(|k| limits.get(k));
+                    if let Some(sample) = limit.and_then(|limit| limit_sample(limit, &self.points[ring..])) {
+                        return sample;
+                    }
+                    let (x, y) = (f64::from(u8::from(u >= 0.5)), f64::from(u8::from(v >= 0.5)));
+                    let k = exact_corner(x, y).expect("halves are corners");
+                    let refined = self.refine(rows, ring);
+                    ring = self.push_child(&children[k], refined);
+                    node = children[k].node;
+                    (u, v) = (2.0 * u - x, 2.0 * v - y);
+                    scale *= 2.0;
+                }
+            }
+        }
+        unreachable!("every walk ends in a regular part or a corner")
+    }
+
+    /// A box that holds the part `[u0,u1] x [v0,v1]` of the patch: the Bézier hulls of its regular parts, and ring hulls
+    /// `depth` splits below the patch, or where the surface is known to lie in them.
+    pub fn bounds(
+        &mut self,
+        library: &PlanLibrary,
+        node: NodeId,
+        ring: &[Point],
+        u: [f64; 2],
+        v: [f64; 2],
+        depth: u32,
+    ) -> DBounds {
+        self.points.clear();
+        self.points.extend_from_slice(ring);
+        let mut bounds = DBounds::EMPTY;
+        self.bound(library, node, 0, u, v, depth, &mut bounds);
+        bounds
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn bound(
+        &mut self,
+        library: &PlanLibrary,
+        node: NodeId,
+        ring: usize,
+        u: [f64; 2],
+        v: [f64; 2],
+        depth: u32,
+        bounds: &mut DBounds,
+    ) {
+        match library.plan(node) {
+            Plan::Regular(rows) => {
+                let control = control_points(rows, &self.points[ring..]);
+                grow_by_hull(bounds, &control, u, v);
+            }
+            Plan::Split { in_hull: true, .. } if depth == 0 => {
+                let n = library.n_points(node);
+                self.points[ring..ring + n].iter().for_each(|p| bounds.grow(p.to_vec()));
+            }
+            Plan::Split { rows, children, .. } => {
+                let refined = self.refine(rows, ring);
+                let mark = self.points.len();
+                for (k, child) in children.iter().enumerate() {
+                    let (x, y) = quarter(k);
+                    let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) else { continue };
+                    let child_ring = self.push_child(child, refined);
+                    self.bound(library, child.node, child_ring, u, v, depth.saturating_sub(1), bounds);
+                    self.points.truncate(mark);
+                }
+                self.points.truncate(refined);
+            }
+        }
+    }
+
+    /// The ring points of a child of a polygon, appended to `out`.
+    pub fn child_ring(library: &PlanLibrary, node: NodeId, ring: &[Point], k: usize, out: &mut Vec<Point>) -> NodeId {
+        match library.plan(node) {
+            Plan::Split { rows, children, .. } => {
+                let child = &children[k];
+                out.extend(child.points.iter().map(|&p| product(rows, p as usize, ring)));
+                child.node
+            }
+            Plan::Regular(_) => unreachable!("a polygon is never regular"),
+        }
+    }
+}
+
+/// Enlarges `bounds` by the Bézier hull of a part of a regular patch.
+pub fn grow_by_hull(bounds: &mut DBounds, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) {
+    for p in regular::bezier_points(control, u, v) {
+        bounds.grow(p.to_vec());
+    }
+}
+
+/// The part of a parameter range that lies in the lower (0) or upper (1) half, as the half sees it.
+fn half_range([a, b]: [f64; 2], offset: f64) -> Option<[f64; 2]> {
+    let range = [(2.0 * a - offset).max(0.0), (2.0 * b - offset).min(1.0)];
+    (range[0] <= range[1]).then_some(range)
+}
+
+fn regular_sample(control: &ControlPoints, u: f64, v: f64, scale: f64) -> SurfaceSample {
+    let (bu, bv) = (regular::basis(u), regular::basis(v));
+    let columns = regular::columns(control, &bv);
+    let columns_dv = regular::columns(control, &regular::basis_derivative(v));
+    SurfaceSample {
+        position: regular::combine(&bu, columns).to_vec(),
+        du: scale * regular::combine(&regular::basis_derivative(u), columns).to_vec(),
+        dv: scale * regular::combine(&bu, columns_dv).to_vec(),
+        kind: SampleKind::Regular,
+    }
+}
+
+/// Position and tangents of a regular patch.
+pub fn sample_regular(control: &ControlPoints, u: f64, v: f64) -> SurfaceSample {
+    regular_sample(control, u, v, 1.0)
+}
+
+fn limit_sample(limit: &Limit, points: &[Point]) -> Option<SurfaceSample> {
+    let at = |rows: &SparseRows, i| product(rows, i, points).to_vec();
+    match limit {
+        Limit::Regular => None,
+        Limit::Position(rows) => Some(SurfaceSample {
+            position: at(rows, 0),
+            du: DVec3::ZERO,
+            dv: DVec3::ZERO,
+            kind: SampleKind::PositionOnly,
+        }),
+        Limit::Smooth(rows) => Some(SurfaceSample {
+            position: at(rows, 0),
+            du: at(rows, 1).normalize_or_zero(),
+            dv: at(rows, 2).normalize_or_zero(),
+            kind: SampleKind::Extraordinary,
+        }),
+    }
+}

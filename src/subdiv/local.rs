@@ -1,0 +1,232 @@
+//! A small half-edge mesh: the **ring** of one target face, cut out of a larger mesh, and its refinement.
+//!
+//! Face 0 is the target and half-edge 0 its first corner. Only the target's corners know all their faces (up to
+//! infinitely sharp edges, which nothing crosses); that is enough to refine the target and the rings of its quarters.
+
+use crate::topology::{Fan, HalfEdges, NONE, VertexTags, fan};
+use rustc_hash::FxHashMap;
+
+/// The ring of a target face.
+#[derive(Clone, Debug, Default)]
+pub struct LocalMesh {
+    /// First half-edge of each face, then the total.
+    pub face_start: Vec<u32>,
+    /// Start vertex of each half-edge.
+    pub vertex: Vec<u32>,
+    /// Face of each half-edge.
+    pub face: Vec<u32>,
+    /// Twin of each half-edge, or [`NONE`] at the ring's outer border and at cuts.
+    pub twin: Vec<u32>,
+    /// Sharpness of each half-edge's edge; 0 where no corner of the target is at either end.
+    pub sharpness: Vec<f32>,
+    /// Tags per vertex; only those of the target's corners are complete, others are read for their semi-sharp edges.
+    pub tags: Vec<VertexTags>,
+}
+
+/// A ring and where its vertices come from.
+#[derive(Debug)]
+pub struct Extracted {
+    /// The ring.
+    pub mesh: LocalMesh,
+    /// Vertex of the source mesh for each local vertex.
+    pub sources: Vec<u32>,
+}
+
+impl HalfEdges for LocalMesh {
+    fn vertex(&self, h: u32) -> u32 {
+        self.vertex[h as usize]
+    }
+
+    fn twin(&self, h: u32) -> u32 {
+        self.twin[h as usize]
+    }
+
+    fn face(&self, h: u32) -> u32 {
+        self.face[h as usize]
+    }
+
+    fn face_corners(&self, face: u32) -> (u32, u32) {
+        let start = self.face_start[face as usize];
+        (start, self.face_start[face as usize + 1] - start)
+    }
+
+    fn edge_sharpness(&self, h: u32) -> f32 {
+        if self.twin[h as usize] == NONE { f32::INFINITY } else { self.sharpness[h as usize] }
+    }
+
+    fn vertex_tags(&self, h: u32) -> VertexTags {
+        self.tags[self.vertex[h as usize] as usize].clone()
+    }
+}
+
+impl LocalMesh {
+    /// Number of faces.
+    pub fn n_faces(&self) -> usize {
+        self.face_start.len() - 1
+    }
+
+    /// Number of half-edges.
+    pub fn n_half_edges(&self) -> usize {
+        self.vertex.len()
+    }
+
+    /// Number of vertices.
+    pub fn n_vertices(&self) -> usize {
+        self.tags.len()
+    }
+
+    /// Number of the target's corners.
+    pub fn n_corners(&self) -> u32 {
+        self.face_start[1]
+    }
+
+    /// Whether all faces are quads.
+    pub fn all_quads(&self) -> bool {
+        self.face_start.windows(2).all(|w| w[1] - w[0] == 4)
+    }
+
+    /// The tags of the vertex where `h` starts.
+    pub fn tags_at(&self, h: u32) -> &VertexTags {
+        &self.tags[self.vertex[h as usize] as usize]
+    }
+
+    /// The faces around corner `h` of the target, up to infinitely sharp edges that bound its sector.
+    pub fn fan(&self, h: u32) -> Fan {
+        let cut = self.tags_at(h).n_infinite >= 2;
+        fan(self, h, |e| is_border(self, e, cut))
+    }
+
+    /// The edges of a fan, counter-clockwise: a half-edge of each and the vertex at its other end. An open fan has one
+    /// more edge than faces, the last of which arrives at the vertex.
+    pub fn fan_edges(&self, fan: &Fan) -> Vec<(u32, u32)> {
+        let mut edges: Vec<_> = fan.spokes.iter().map(|&h| (h, self.vertex(self.next(h)))).collect();
+        if !fan.closed {
+            let arriving = self.prev(*fan.spokes.last().expect("a fan has a spoke"));
+            edges.push((arriving, self.vertex(arriving)));
+        }
+        edges
+    }
+
+    /// Everything that decides the plan, as words to hash and compare.
+    pub fn key(&self) -> Vec<u32> {
+        let mut key = Vec::with_capacity(3 * self.n_half_edges() + 16);
+        key.push(self.n_faces() as u32);
+        key.extend_from_slice(&self.face_start);
+        key.extend_from_slice(&self.vertex);
+        key.extend_from_slice(&self.twin);
+        key.extend(
+            self.sharpness.iter().enumerate().filter(|(_, s)| **s > 0.0).flat_map(|(h, s)| [h as u32, s.to_bits()]),
+        );
+        for (v, tags) in self.tags.iter().enumerate() {
+            if *tags != VertexTags::default() {
+                key.extend([u32::MAX, v as u32, tags.sharpness.to_bits(), tags.n_infinite]);
+                key.extend(tags.semi_sharp.iter().map(|s| s.to_bits()));
+            }
+        }
+        key
+    }
+}
+
+fn is_border<M: HalfEdges + ?Sized>(mesh: &M, h: u32, cut: bool) -> bool {
+    mesh.twin(h) == NONE || (cut && mesh.edge_sharpness(h) == f32::INFINITY)
+}
+
+/// Cuts the ring of the face of `first` out of `mesh`; local half-edge 0 is `first`.
+///
+/// `outer_tags`: whether vertices that are not corners of the target keep their semi-sharp edges (chaikin needs them).
+pub fn extract<M: HalfEdges + ?Sized>(mesh: &M, first: u32, outer_tags: bool) -> Extracted {
+    let mut x = Extractor { source: mesh, starts: Vec::new(), place_of_face: FxHashMap::default() };
+    x.add_face(first);
+    let n_corners = mesh.face_corners(mesh.face(first)).1;
+    let mut h = first;
+    let mut corner_tags = Vec::with_capacity(n_corners as usize);
+    for _ in 0..n_corners {
+        let tags = mesh.vertex_tags(h);
+        let cut = tags.n_infinite >= 2;
+        let fan = fan(mesh, h, |e| is_border(mesh, e, cut));
+        // Counter-clockwise from the target, then what lies clockwise of it: an order that only topology decides.
+        let at = fan.spokes.iter().position(|&s| s == h).expect("the fan holds its own spoke");
+        fan.spokes[at..].iter().chain(fan.spokes[..at].iter().rev()).for_each(|&s| x.add_face(s));
+        corner_tags.push(tags);
+        h = mesh.next(h);
+    }
+    x.finish(&corner_tags, outer_tags)
+}
+
+struct Extractor<'a, M: ?Sized> {
+    source: &'a M,
+    /// Half-edge of the source where each local face starts.
+    starts: Vec<u32>,
+    place_of_face: FxHashMap<u32, u32>,
+}
+
+impl<M: HalfEdges + ?Sized> Extractor<'_, M> {
+    fn add_face(&mut self, h: u32) {
+        let place = self.starts.len() as u32;
+        let face = self.source.face(h);
+        if *self.place_of_face.entry(face).or_insert(place) == place {
+            self.starts.push(h);
+        }
+    }
+
+    fn finish(self, corner_tags: &[VertexTags], outer_tags: bool) -> Extracted {
+        let mut mesh = LocalMesh { face_start: vec![0], ..Default::default() };
+        let mut half_edges = Vec::new();
+        let mut sources = Vec::new();
+        let mut local_vertex = FxHashMap::default();
+        for (place, &start) in self.starts.iter().enumerate() {
+            let mut h = start;
+            loop {
+                let v = self.source.vertex(h);
+                mesh.vertex.push(*local_vertex.entry(v).or_insert_with(|| {
+                    sources.push(v);
+                    sources.len() as u32 - 1
+                }));
+                mesh.face.push(place as u32);
+                half_edges.push(h);
+                h = self.source.next(h);
+                if h == start {
+                    break;
+                }
+            }
+            mesh.face_start.push(half_edges.len() as u32);
+        }
+        mesh.twin = half_edges.iter().map(|&h| self.local(&mesh, self.source.twin(h))).collect();
+        self.set_tags(&mut mesh, &half_edges, sources.len(), corner_tags, outer_tags);
+        Extracted { mesh, sources }
+    }
+
+    /// The local number of a half-edge of the source, or [`NONE`].
+    fn local(&self, mesh: &LocalMesh, h: u32) -> u32 {
+        if h == NONE {
+            return NONE;
+        }
+        let face = self.source.face(h);
+        let Some(&place) = self.place_of_face.get(&face) else { return NONE };
+        let (start, n) = self.source.face_corners(face);
+        let turned = (h - start + n - (self.starts[place as usize] - start)) % n;
+        mesh.face_start[place as usize] + turned
+    }
+
+    fn set_tags(&self, mesh: &mut LocalMesh, half_edges: &[u32], n: usize, corner_tags: &[VertexTags], outer: bool) {
+        mesh.tags = vec![VertexTags::default(); n];
+        if outer {
+            for (&v, &h) in mesh.vertex.iter().zip(half_edges) {
+                mesh.tags[v as usize].semi_sharp = self.source.vertex_tags(h).semi_sharp;
+            }
+        }
+        let mut is_corner = vec![false; n];
+        for (k, tags) in corner_tags.iter().enumerate() {
+            let v = mesh.vertex[k] as usize;
+            is_corner[v] = true;
+            mesh.tags[v] = tags.clone();
+        }
+        mesh.sharpness = (0..half_edges.len())
+            .map(|i| {
+                let ends = [mesh.vertex[i], mesh.vertex[mesh.next(i as u32) as usize]];
+                let known = ends.iter().any(|&v| is_corner[v as usize]);
+                if known && mesh.twin[i] != NONE { self.source.edge_sharpness(half_edges[i]) } else { 0.0 }
+            })
+            .collect();
+    }
+}

@@ -1,0 +1,307 @@
+//! The plan library: one node per distinct ring, shared by all faces, levels and meshes with the same rules.
+
+use super::local::{Extracted, LocalMesh, extract};
+use super::rules::{self, CornerLimit, Origin, Refined, Row, RuleSet};
+use crate::mesh::CreaseMethod;
+use crate::topology::NONE;
+use rustc_hash::FxHashMap;
+
+/// A node of the library.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct NodeId(pub u32);
+
+/// Rows of a sparse matrix, one after the other.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SparseRows {
+    start: Vec<u32>,
+    column: Vec<u32>,
+    weight: Vec<f64>,
+}
+
+impl SparseRows {
+    /// Packs rows.
+    pub fn new<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Self {
+        let mut packed = SparseRows { start: vec![0], ..Default::default() };
+        for row in rows {
+            packed.column.extend(row.iter().map(|e| e.0));
+            packed.weight.extend(row.iter().map(|e| e.1));
+            packed.start.push(packed.column.len() as u32);
+        }
+        packed
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.start.len().saturating_sub(1)
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Columns and weights of row `i`.
+    #[inline]
+    pub fn row(&self, i: usize) -> (&[u32], &[f64]) {
+        let range = self.start[i] as usize..self.start[i + 1] as usize;
+        (&self.column[range.clone()], &self.weight[range])
+    }
+
+    fn bytes(&self) -> usize {
+        4 * (self.start.len() + self.column.len()) + 8 * self.weight.len()
+    }
+}
+
+/// A quarter of a split face.
+#[derive(Clone, Debug)]
+pub struct Child {
+    /// Its node.
+    pub node: NodeId,
+    /// Which refined point each of the child's ring points is.
+    pub points: Vec<u32>,
+}
+
+/// What is known of the limit at a corner of a node.
+#[derive(Clone, Debug)]
+pub enum Limit {
+    /// The surface is regular there sooner or later: walk down.
+    Regular,
+    /// A position without tangents.
+    Position(SparseRows),
+    /// A position (row 0) and tangents along u and v (rows 1 and 2), of which only the directions count.
+    Smooth(SparseRows),
+}
+
+/// How the surface over a ring is found.
+#[derive(Clone, Debug)]
+pub enum Plan {
+    /// Bicubic B-spline: 16 rows give the control points, u fastest.
+    Regular(SparseRows),
+    /// One Catmull-Clark step, then the quarters (a polygon of n sides has n children).
+    Split {
+        /// The refined points that children use.
+        rows: SparseRows,
+        /// One child per corner. Quarters of quads keep the quad's orientation; children of polygons start at their corner.
+        children: Vec<Child>,
+        /// Limits at the corners.
+        limits: Vec<Limit>,
+        /// Whether the surface lies in the convex hull of the ring (all weights from here on are non-negative).
+        in_hull: bool,
+    },
+}
+
+/// All nodes of meshes that share a [`RuleSet`].
+#[derive(Debug)]
+pub struct PlanLibrary {
+    rules: RuleSet,
+    nodes: Vec<Option<Plan>>,
+    n_points: Vec<u32>,
+    by_key: FxHashMap<Vec<u32>, NodeId>,
+}
+
+impl PlanLibrary {
+    /// An empty library.
+    pub fn new(rules: RuleSet) -> Self {
+        Self { rules, nodes: Vec::new(), n_points: Vec::new(), by_key: FxHashMap::default() }
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether no node was made yet.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Number of ring points of a node.
+    pub fn n_points(&self, node: NodeId) -> usize {
+        self.n_points[node.0 as usize] as usize
+    }
+
+    /// A node's plan.
+    #[inline]
+    pub fn plan(&self, node: NodeId) -> &Plan {
+        self.nodes[node.0 as usize].as_ref().expect("nodes are complete once the library is built")
+    }
+
+    /// Whether rings keep the semi-sharp edges of vertices that are not corners of their target.
+    pub fn outer_tags(&self) -> bool {
+        self.rules.crease_method == CreaseMethod::Chaikin
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let keys: usize = self.by_key.keys().map(|k| 4 * k.len() + 40).sum();
+        keys + self.nodes.iter().flatten().map(plan_bytes).sum::<usize>()
+    }
+
+    /// Forgets how nodes were found, once no more are needed.
+    pub fn seal(&mut self) {
+        self.by_key = FxHashMap::default();
+    }
+
+    /// The node for a ring, if it is known.
+    pub fn find(&self, key: &[u32]) -> Option<NodeId> {
+        self.by_key.get(key).copied()
+    }
+
+    /// The node for a ring, made if it is new.
+    pub fn node(&mut self, ring: &LocalMesh) -> NodeId {
+        let key = ring.key();
+        if let Some(&id) = self.by_key.get(&key) {
+            return id;
+        }
+        let id = NodeId(self.nodes.len() as u32);
+        self.nodes.push(None);
+        self.n_points.push(ring.n_vertices() as u32);
+        self.by_key.insert(key, id);
+        let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
+        let plan = match regular {
+            Some(rows) => Plan::Regular(SparseRows::new(rows.iter().flatten())),
+            None => self.split(id, ring),
+        };
+        self.nodes[id.0 as usize] = Some(plan);
+        id
+    }
+
+    fn split(&mut self, id: NodeId, ring: &LocalMesh) -> Plan {
+        let n = ring.n_corners();
+        let refined = rules::refine(&self.rules, ring);
+        let rings: Vec<Extracted> =
+            (0..n).map(|k| extract(&refined.mesh, child_start(n, k), self.outer_tags())).collect();
+        let (rows, points) = self.shared_rows(ring, &refined, &rings);
+        let children: Vec<Child> =
+            rings.iter().zip(points).map(|(child, points)| Child { node: self.node(&child.mesh), points }).collect();
+        let packed = SparseRows::new(&rows);
+        let limits = (0..n).map(|k| self.limit(id, ring, &packed, &children[k as usize], k)).collect();
+        let semi_sharp = ring.tags.iter().any(|t| !t.semi_sharp.is_empty());
+        let in_hull = !(self.outer_tags() && semi_sharp);
+        Plan::Split { rows: packed, children, limits, in_hull }
+    }
+
+    /// Rows of the refined points that any child uses, and each child's points in terms of them.
+    fn shared_rows(&self, ring: &LocalMesh, refined: &Refined, rings: &[Extracted]) -> (Vec<Row>, Vec<Vec<u32>>) {
+        let mut place = vec![NONE; refined.origin.len()];
+        let mut rows = Vec::new();
+        let points = rings
+            .iter()
+            .map(|child| {
+                let place_of = |&v: &u32| {
+                    if place[v as usize] == NONE {
+                        place[v as usize] = rows.len() as u32;
+                        rows.push(rules::refined_row(
+                            &self.rules,
+                            ring,
+                            corner_origin(ring, refined.origin[v as usize]),
+                        ));
+                    }
+                    place[v as usize]
+                };
+                child.sources.iter().map(place_of).collect()
+            })
+            .collect();
+        (rows, points)
+    }
+
+    fn limit(&self, id: NodeId, ring: &LocalMesh, rows: &SparseRows, child: &Child, k: u32) -> Limit {
+        match rules::corner_limit(ring, k) {
+            CornerLimit::Position(row) => Limit::Position(SparseRows::new([&row])),
+            CornerLimit::Smooth(position, [along, next]) => {
+                let negated = |row: &Row| -> Row { row.iter().map(|&(p, w)| (p, -w)).collect() };
+                let [du, dv] = match k {
+                    _ if ring.n_corners() != 4 => [along, next],
+                    0 => [along, next],
+                    1 => [negated(&next), along],
+                    2 => [negated(&along), negated(&next)],
+                    _ => [next, negated(&along)],
+                };
+                Limit::Smooth(SparseRows::new([&position, &du, &dv]))
+            }
+            CornerLimit::Iterate if child.node == id => Limit::Position(iterate(ring, rows, child, k)),
+            CornerLimit::Iterate | CornerLimit::Descend => {
+                let corner = if ring.n_corners() == 4 { k } else { 0 };
+                self.pull_back(rows, child, corner)
+            }
+        }
+    }
+
+    /// A child's limit at its corner, in terms of this ring's points.
+    fn pull_back(&self, rows: &SparseRows, child: &Child, corner: u32) -> Limit {
+        let compose = |limit: &SparseRows| {
+            let composed: Vec<Row> = (0..limit.len())
+                .map(|i| {
+                    let (columns, weights) = limit.row(i);
+                    let terms = columns.iter().zip(weights).flat_map(|(&c, &w)| {
+                        let (from, by) = rows.row(child.points[c as usize] as usize);
+                        from.iter().zip(by).map(move |(&p, &x)| (p, x * w))
+                    });
+                    rules::merge(terms.collect())
+                })
+                .collect();
+            SparseRows::new(&composed)
+        };
+        match self.plan(child.node) {
+            Plan::Regular(_) => Limit::Regular,
+            Plan::Split { limits, .. } => match &limits[corner as usize] {
+                Limit::Regular => Limit::Regular,
+                Limit::Position(row) => Limit::Position(compose(row)),
+                Limit::Smooth(rows) => Limit::Smooth(compose(rows)),
+            },
+        }
+    }
+}
+
+/// Child `k`'s first half-edge in the refined ring: quarters of quads are turned so that their corner k is the face's.
+fn child_start(n_corners: u32, k: u32) -> u32 {
+    if n_corners == 4 { 4 * k + (4 - k) % 4 } else { 4 * k }
+}
+
+/// Vertex rows are asked by a corner of the target: any other spoke would see another fan.
+fn corner_origin(ring: &LocalMesh, origin: Origin) -> Origin {
+    match origin {
+        Origin::Vertex(h) => {
+            let v = ring.vertex[h as usize];
+            let corner = (0..ring.n_corners()).find(|&k| ring.vertex[k as usize] == v);
+            Origin::Vertex(corner.expect("children use the points of the target's corners only"))
+        }
+        other => other,
+    }
+}
+
+/// The limit of corner `k` of a node whose quarter there is the node itself: the row of the corner after many steps.
+///
+/// The part of the row that has not converged shrinks by the subdominant eigenvalue each step, at most 0.75 for the
+/// rings that have no closed form, so that 200 steps leave less than 1e-24 of it.
+fn iterate(ring: &LocalMesh, rows: &SparseRows, child: &Child, k: u32) -> SparseRows {
+    const STEPS: usize = 200;
+    let n = ring.n_vertices();
+    let mut limit = vec![0.0; n];
+    limit[ring.vertex[k as usize] as usize] = 1.0;
+    for _ in 0..STEPS {
+        let mut before = vec![0.0; n];
+        for (c, &w) in limit.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+            let (from, by) = rows.row(child.points[c] as usize);
+            from.iter().zip(by).for_each(|(&p, &x)| before[p as usize] += x * w);
+        }
+        limit = before;
+    }
+    let row: Row = limit.iter().enumerate().filter(|(_, w)| **w != 0.0).map(|(p, &w)| (p as u32, w)).collect();
+    SparseRows::new([&row])
+}
+
+fn plan_bytes(plan: &Plan) -> usize {
+    let limit_bytes = |l: &Limit| match l {
+        Limit::Regular => 0,
+        Limit::Position(rows) | Limit::Smooth(rows) => rows.bytes(),
+    };
+    match plan {
+        Plan::Regular(rows) => rows.bytes(),
+        Plan::Split { rows, children, limits, .. } => {
+            rows.bytes()
+                + children.iter().map(|c| 4 * c.points.len() + 32).sum::<usize>()
+                + limits.iter().map(|l| limit_bytes(l) + 80).sum::<usize>()
+        }
+    }
+}

@@ -1,0 +1,420 @@
+//! Catmull-Clark's weights: how points of one level follow from the level before, and where they end up.
+//!
+//! A **row** is a sparse list of (point, weight). The rules are those of OpenSubdiv: sharpness decides between the masks
+//! for smooth, crease and corner vertices, and while it decays a vertex is a blend of the mask before and after.
+
+use super::local::LocalMesh;
+use crate::mesh::{CreaseMethod, TriangleRule};
+use crate::topology::{HalfEdges, NONE, VertexTags};
+use std::f64::consts::PI;
+
+/// A weighted sum of points; points may repeat until [`merge`] adds them up.
+pub type Row = Vec<(u32, f64)>;
+
+/// The options of a mesh that change weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RuleSet {
+    /// How sharpness decays.
+    pub crease_method: CreaseMethod,
+    /// Edge weights beside triangles.
+    pub triangles: TriangleRule,
+}
+
+/// Weight of each face point for an edge beside a triangle, with smooth triangles (OpenSubdiv).
+const SMOOTH_TRIANGLE_WEIGHT: f64 = 0.470;
+
+/// Adds up repeated points and drops zeros.
+pub fn merge(mut row: Row) -> Row {
+    row.sort_by_key(|e| e.0);
+    let mut out: Row = Vec::with_capacity(row.len());
+    for (p, w) in row {
+        match out.last_mut() {
+            Some(last) if last.0 == p => last.1 += w,
+            _ => out.push((p, w)),
+        }
+    }
+    out.retain(|e| e.1 != 0.0);
+    out
+}
+
+fn scaled(row: &[(u32, f64)], s: f64) -> impl Iterator<Item = (u32, f64)> + '_ {
+    row.iter().map(move |&(p, w)| (p, w * s))
+}
+
+/// Sharpness of a vertex after a step.
+pub fn decay(s: f32) -> f32 {
+    if s == f32::INFINITY {
+        s
+    } else if s > 1.0 {
+        s - 1.0
+    } else {
+        0.0
+    }
+}
+
+/// Sharpness after a step of the half, at a vertex with these semi-sharp edges, of one of them.
+pub fn decay_edge(method: CreaseMethod, s: f32, semi_sharp_at_vertex: &[f32]) -> f32 {
+    if s == f32::INFINITY || method == CreaseMethod::Uniform || s <= 0.0 {
+        return decay(s);
+    }
+    let mut sum = 0.0f32;
+    let mut n_others = 0u32;
+    let mut skipped = false;
+    for &other in semi_sharp_at_vertex {
+        if other == s && !skipped {
+            skipped = true;
+        } else {
+            sum += other;
+            n_others += 1;
+        }
+    }
+    let after = if n_others > 0 { 0.75 * s + 0.25 * (sum / n_others as f32) - 1.0 } else { s - 1.0 };
+    after.max(0.0)
+}
+
+/// A vertex's tags after a step, as its child inherits them.
+pub fn decay_tags(method: CreaseMethod, tags: &VertexTags) -> VertexTags {
+    let mut semi_sharp: Vec<f32> =
+        tags.semi_sharp.iter().map(|&s| decay_edge(method, s, &tags.semi_sharp)).filter(|&s| s > 0.0).collect();
+    semi_sharp.sort_by(f32::total_cmp);
+    VertexTags { sharpness: decay(tags.sharpness), n_infinite: tags.n_infinite, semi_sharp }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Mask {
+    Smooth,
+    Crease,
+    Corner,
+}
+
+fn mask(sharpness: f32, n_sharp: usize) -> Mask {
+    match n_sharp {
+        _ if sharpness > 0.0 => Mask::Corner,
+        0 | 1 => Mask::Smooth,
+        2 => Mask::Crease,
+        _ => Mask::Corner,
+    }
+}
+
+/// The mean of a face's vertices.
+pub fn face_point(mesh: &LocalMesh, face: u32) -> Row {
+    let (start, n) = mesh.face_corners(face);
+    (start..start + n).map(|h| (mesh.vertex[h as usize], 1.0 / f64::from(n))).collect()
+}
+
+/// Sharpness of the two halves of an edge after a step: at the start of `h` and at its end.
+pub fn halves(rules: &RuleSet, mesh: &LocalMesh, h: u32) -> [f32; 2] {
+    let s = mesh.edge_sharpness(h);
+    let at = |v: u32| decay_edge(rules.crease_method, s, &mesh.tags[v as usize].semi_sharp);
+    [at(mesh.vertex(h)), at(mesh.vertex(mesh.next(h)))]
+}
+
+/// The new point of an edge.
+pub fn edge_point(rules: &RuleSet, mesh: &LocalMesh, h: u32) -> Row {
+    let middle: Row = vec![(mesh.vertex(h), 0.5), (mesh.vertex(mesh.next(h)), 0.5)];
+    let s = mesh.edge_sharpness(h);
+    if s == f32::INFINITY || (s > 0.0 && halves(rules, mesh, h).iter().all(|&half| half > 0.0)) {
+        return merge(middle);
+    }
+    let faces = [mesh.face(h), mesh.face(mesh.twin(h))];
+    let sizes = faces.map(|f| mesh.face_corners(f).1);
+    let weight = match rules.triangles {
+        TriangleRule::Smooth if sizes.contains(&3) => {
+            let of = |n| if n == 3 { SMOOTH_TRIANGLE_WEIGHT } else { 0.25 };
+            0.5 * (of(sizes[0]) + of(sizes[1]))
+        }
+        _ => 0.25,
+    };
+    let blend = 1.0 - f64::from(s);
+    let mut row: Row = scaled(&middle, f64::from(s) + blend * (1.0 - 2.0 * weight)).collect();
+    for f in faces {
+        row.extend(scaled(&face_point(mesh, f), blend * weight));
+    }
+    merge(row)
+}
+
+/// The new position of the target's corner `h`.
+pub fn vertex_point(rules: &RuleSet, mesh: &LocalMesh, h: u32) -> Row {
+    let v = mesh.vertex(h);
+    let tags = mesh.tags_at(h);
+    let after = decay_tags(rules.crease_method, tags);
+    let mask_before = mask(tags.sharpness, tags.n_sharp());
+    let mask_after = mask(after.sharpness, after.n_sharp());
+    let fan = mesh.fan(h);
+    let edges = mesh.fan_edges(&fan);
+    let row_of = |mask: Mask, is_sharp: &dyn Fn(u32) -> bool| -> Row {
+        match mask {
+            Mask::Corner => vec![(v, 1.0)],
+            Mask::Crease => {
+                let ends = edges.iter().filter(|e| is_sharp(e.0)).map(|e| (e.1, 0.125));
+                std::iter::once((v, 0.75)).chain(ends).collect()
+            }
+            Mask::Smooth => smooth_vertex(mesh, v, &fan.spokes, &edges),
+        }
+    };
+    let before = row_of(mask_before, &|e| mesh.edge_sharpness(e) > 0.0);
+    if mask_before == Mask::Smooth || mask_before == mask_after {
+        return merge(before);
+    }
+    let decayed = |e: u32| decay_edge(rules.crease_method, mesh.edge_sharpness(e), &tags.semi_sharp);
+    let after_row = row_of(mask_after, &|e| decayed(e) > 0.0);
+    let w = transition_weight(rules, tags, &after);
+    let mut row: Row = scaled(&before, w).collect();
+    row.extend(scaled(&after_row, 1.0 - w));
+    merge(row)
+}
+
+/// The mean, at most 1, of the sharpness values that decay to nothing in this step.
+fn transition_weight(rules: &RuleSet, tags: &VertexTags, after: &VertexTags) -> f64 {
+    let mut sum = 0.0f32;
+    let mut n = 0u32;
+    if tags.sharpness > 0.0 && after.sharpness == 0.0 {
+        sum += tags.sharpness;
+        n += 1;
+    }
+    for &s in &tags.semi_sharp {
+        let vanishes = match rules.crease_method {
+            CreaseMethod::Uniform => s <= 1.0,
+            CreaseMethod::Chaikin => decay_edge(rules.crease_method, s, &tags.semi_sharp) <= 0.0,
+        };
+        if vanishes {
+            sum += s;
+            n += 1;
+        }
+    }
+    if n == 0 { 0.0 } else { f64::from((sum / n as f32).min(1.0)) }
+}
+
+fn smooth_vertex(mesh: &LocalMesh, v: u32, spokes: &[u32], edges: &[(u32, u32)]) -> Row {
+    let n = spokes.len() as f64;
+    let mut row: Row = vec![(v, (n - 2.0) / n)];
+    row.extend(edges.iter().map(|e| (e.1, 1.0 / (n * n))));
+    for &h in spokes {
+        row.extend(scaled(&face_point(mesh, mesh.face(h)), 1.0 / (n * n)));
+    }
+    row
+}
+
+/// What is known of the limit at a corner of the target.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CornerLimit {
+    /// Semi-sharp or beside a polygon: ask the corner's quarter.
+    Descend,
+    /// The limit is this row.
+    Position(Row),
+    /// The limit is the first row; the others are the tangents along the corner's outgoing edge of the target and along
+    /// the next one counter-clockwise. Only their directions are meaningful.
+    Smooth(Row, [Row; 2]),
+    /// No closed form (a dart with an infinitely sharp edge, a smooth vertex of valence 2): iterate the step.
+    Iterate,
+}
+
+/// The limit at corner `h` of the target, if the ring decides it.
+pub fn corner_limit(mesh: &LocalMesh, h: u32) -> CornerLimit {
+    let v = mesh.vertex(h);
+    let tags = mesh.tags_at(h);
+    let forever_corner = tags.sharpness == f32::INFINITY || tags.n_infinite > 2;
+    if forever_corner {
+        return CornerLimit::Position(vec![(v, 1.0)]);
+    }
+    if tags.sharpness > 0.0 || !tags.semi_sharp.is_empty() {
+        return CornerLimit::Descend;
+    }
+    let fan = mesh.fan(h);
+    if fan.spokes.iter().any(|&s| mesh.face_corners(mesh.face(s)).1 != 4) {
+        return CornerLimit::Descend;
+    }
+    let edges = mesh.fan_edges(&fan);
+    match (tags.n_infinite, fan.spokes.len()) {
+        (2, _) => {
+            let ends = edges.iter().filter(|e| mesh.edge_sharpness(e.0) > 0.0).map(|e| (e.1, 1.0 / 6.0));
+            CornerLimit::Position(merge(std::iter::once((v, 4.0 / 6.0)).chain(ends).collect()))
+        }
+        (0, n) if n >= 3 => {
+            let at = fan.spokes.iter().position(|&s| s == h).expect("the fan holds its own spoke");
+            let mut spokes = fan.spokes.clone();
+            spokes.rotate_left(at);
+            smooth_limit(mesh, v, &spokes)
+        }
+        _ => CornerLimit::Iterate,
+    }
+}
+
+fn smooth_limit(mesh: &LocalMesh, v: u32, spokes: &[u32]) -> CornerLimit {
+    let n = spokes.len() as f64;
+    let edge = |i: usize| mesh.vertex(mesh.next(spokes[i % spokes.len()]));
+    let diagonal = |i: usize| mesh.vertex(mesh.next(mesh.next(spokes[i % spokes.len()])));
+    let scale = 1.0 / (n * (n + 5.0));
+    let mut position: Row = vec![(v, n * n * scale)];
+    let t = 2.0 * PI / n;
+    let r = (5.0 + t.cos() + (t / 2.0).cos() * (18.0 + 2.0 * t.cos()).sqrt()) / 16.0;
+    let mut tangents = [Row::new(), Row::new()];
+    for i in 0..spokes.len() {
+        position.push((edge(i), 4.0 * scale));
+        position.push((diagonal(i), scale));
+        for (k, tangent) in tangents.iter_mut().enumerate() {
+            let a = (i as f64 - k as f64) * t;
+            tangent.push((edge(i), 4.0 * a.cos()));
+            tangent.push((diagonal(i), (a.cos() + (a + t).cos()) / (4.0 * r - 1.0)));
+        }
+    }
+    CornerLimit::Smooth(merge(position), tangents.map(merge))
+}
+
+/// The 16 bicubic B-spline control points of a regular ring, `[j][i]` with the target's corner 0 at `[1][1]`, corner 1 at
+/// `[1][2]`; or `None` if the ring is not regular.
+pub fn regular_rows(mesh: &LocalMesh) -> Option<[[Row; 4]; 4]> {
+    if !mesh.all_quads() || !(0..4).all(|h| is_regular_corner(mesh, h)) {
+        return None;
+    }
+    let mut grid = ControlGrid::default();
+    for k in 0..4 {
+        grid.set(k, 0, 0, mesh.vertex(k));
+        if !is_sharp(mesh, k) {
+            // The face across edge k: its half-edge along the edge runs from corner k+1 to corner k.
+            let across = mesh.twin(k);
+            let left = mesh.next(mesh.next(across));
+            grid.set(k, 0, -1, mesh.vertex(left));
+            grid.set(k, 1, -1, mesh.vertex(mesh.next(left)));
+            if !is_sharp(mesh, mesh.prev(k)) {
+                let diagonal = mesh.twin(mesh.next(across));
+                grid.set(k, -1, -1, mesh.vertex(mesh.prev(diagonal)));
+            }
+        }
+    }
+    grid.extrapolate();
+    Some(grid.rows.map(|row| row.map(|p| p.expect("every control point is given or extrapolated"))))
+}
+
+fn is_sharp(mesh: &LocalMesh, h: u32) -> bool {
+    mesh.edge_sharpness(h) == f32::INFINITY
+}
+
+fn is_regular_corner(mesh: &LocalMesh, h: u32) -> bool {
+    let tags = mesh.tags_at(h);
+    let fan = mesh.fan(h);
+    let forever_corner = tags.sharpness == f32::INFINITY || tags.n_infinite > 2;
+    match (fan.spokes.len(), fan.closed) {
+        (1, false) => forever_corner,
+        (2, false) => tags.sharpness == 0.0 && tags.n_infinite == 2 && tags.semi_sharp.is_empty(),
+        (4, true) => tags.sharpness == 0.0 && tags.n_infinite == 0 && tags.semi_sharp.is_empty(),
+        _ => false,
+    }
+}
+
+#[derive(Default)]
+struct ControlGrid {
+    rows: [[Option<Row>; 4]; 4],
+}
+
+impl ControlGrid {
+    /// Sets the point at (x, y) in the frame that has corner `k` of the target as origin and edge `k` as x axis.
+    fn set(&mut self, k: u32, x: i32, y: i32, vertex: u32) {
+        let (i, j) = match k {
+            0 => (1 + x, 1 + y),
+            1 => (2 - y, 1 + x),
+            2 => (2 - x, 2 - y),
+            _ => (1 + y, 2 - x),
+        };
+        self.rows[j as usize][i as usize] = Some(vec![(vertex, 1.0)]);
+    }
+
+    /// Points beyond sharp edges mirror those before: P(-1) = 2 P(0) - P(1).
+    fn extrapolate(&mut self) {
+        let mirror = |near: &Option<Row>, far: &Option<Row>| -> Option<Row> {
+            Some(merge(scaled(near.as_ref()?, 2.0).chain(scaled(far.as_ref()?, -1.0)).collect()))
+        };
+        for _ in 0..2 {
+            for j in 0..4 {
+                for (i, near, far) in [(0, 1, 2), (3, 2, 1)] {
+                    if self.rows[j][i].is_none() {
+                        self.rows[j][i] = mirror(&self.rows[j][near], &self.rows[j][far]);
+                    }
+                    if self.rows[i][j].is_none() {
+                        self.rows[i][j] = mirror(&self.rows[near][j], &self.rows[far][j]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The refined ring mesh: all quads, vertices numbered old vertices, then edges, then faces.
+pub struct Refined {
+    /// Half-edges `4h..4h+4` form the quad at the start of half-edge `h`: corner, edge `h`, face, edge `prev(h)`.
+    pub mesh: LocalMesh,
+    /// For each vertex of `mesh`, the half-edge, edge or face it comes from.
+    pub origin: Vec<Origin>,
+}
+
+/// Where a refined vertex comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// A vertex, by a half-edge that starts there.
+    Vertex(u32),
+    /// An edge, by one of its half-edges.
+    Edge(u32),
+    /// A face.
+    Face(u32),
+}
+
+/// The topology and sharpness of a ring after one step.
+pub fn refine(rules: &RuleSet, mesh: &LocalMesh) -> Refined {
+    let n = mesh.n_half_edges() as u32;
+    let mut origin: Vec<Origin> = vec![Origin::Vertex(NONE); mesh.n_vertices()];
+    for h in (0..n).rev() {
+        origin[mesh.vertex(h) as usize] = Origin::Vertex(h);
+    }
+    let mut edge_vertex = vec![NONE; n as usize];
+    for h in 0..n {
+        let twin = mesh.twin(h);
+        edge_vertex[h as usize] = if twin != NONE && twin < h {
+            edge_vertex[twin as usize]
+        } else {
+            origin.push(Origin::Edge(h));
+            origin.len() as u32 - 1
+        };
+    }
+    let first_face = origin.len() as u32;
+    origin.extend((0..mesh.n_faces() as u32).map(Origin::Face));
+    let mut out = LocalMesh { face_start: (0..=n).map(|f| 4 * f).collect(), ..Default::default() };
+    for h in 0..n {
+        let (next, prev) = (mesh.next(h), mesh.prev(h));
+        let child_of = |t: u32, k: u32| if t == NONE { NONE } else { 4 * t + k };
+        let across = mesh.twin(h);
+        let before = mesh.twin(prev);
+        let face = first_face + mesh.face(h);
+        out.vertex.extend([mesh.vertex(h), edge_vertex[h as usize], face, edge_vertex[prev as usize]]);
+        out.face.extend([h; 4]);
+        let beside = if across == NONE { NONE } else { mesh.next(across) };
+        out.twin.extend([child_of(beside, 3), 4 * next + 2, 4 * prev + 1, child_of(before, 0)]);
+        let end_half = halves(rules, mesh, prev)[1];
+        out.sharpness.extend([halves(rules, mesh, h)[0], 0.0, 0.0, end_half]);
+    }
+    out.tags = origin.iter().map(|o| refined_tags(rules, mesh, *o)).collect();
+    Refined { mesh: out, origin }
+}
+
+fn refined_tags(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> VertexTags {
+    match origin {
+        Origin::Vertex(h) => decay_tags(rules.crease_method, mesh.tags_at(h)),
+        Origin::Face(_) => VertexTags::default(),
+        Origin::Edge(h) if mesh.edge_sharpness(h) == f32::INFINITY => {
+            VertexTags { n_infinite: 2, ..Default::default() }
+        }
+        Origin::Edge(h) => {
+            let mut semi_sharp: Vec<f32> = halves(rules, mesh, h).into_iter().filter(|&s| s > 0.0).collect();
+            semi_sharp.sort_by(f32::total_cmp);
+            VertexTags { semi_sharp, ..Default::default() }
+        }
+    }
+}
+
+/// The row of a refined vertex; vertices must be corners of the target.
+pub fn refined_row(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> Row {
+    match origin {
+        Origin::Vertex(h) => vertex_point(rules, mesh, h),
+        Origin::Edge(h) => edge_point(rules, mesh, h),
+        Origin::Face(f) => merge(face_point(mesh, f)),
+    }
+}

@@ -1,0 +1,341 @@
+//! One mesh ready for evaluation: topology, control points in lattice units, and the plan of every face.
+
+use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, grow_by_hull, sample_regular};
+use super::local::extract;
+use super::plan::{NodeId, PlanLibrary};
+use super::regular::ControlPoints;
+use super::rules::RuleSet;
+use crate::error::{Error, Result};
+use crate::ids::{FaceId, PatchId};
+use crate::math::DBounds;
+use crate::mesh::ControlMesh;
+use crate::topology::{HalfEdges, NONE, Topology};
+use glam::DVec3;
+use parking_lot::RwLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The integer grid that tessellated vertices are rounded to: `object = center + step * lattice`.
+///
+/// The step is a power of two and no control point is further than 2^22 steps from the centre, so that lattice points are
+/// exact in f32, and rounding moves a vertex by less than 2^-22 of the mesh's half extent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice {
+    /// Centre of the mesh in object space.
+    pub center: DVec3,
+    /// Size of a lattice cell in object space.
+    pub step: f64,
+}
+
+impl Lattice {
+    /// Largest lattice coordinate of a control point, as a power of two.
+    const BITS: i32 = 22;
+
+    /// The lattice for a mesh with these bounds.
+    pub fn new(bounds: DBounds) -> Self {
+        if bounds.is_empty() {
+            return Self { center: DVec3::ZERO, step: 1.0 };
+        }
+        let center = bounds.center();
+        let half = (bounds.max - center).max_element().max((center - bounds.min).max_element());
+        // Where all vertices coincide, the unit is what f64 can tell apart there.
+        let half = half.max(center.abs().max_element() * f64::EPSILON).max(1e-290);
+        let exponent = half.log2().ceil() as i32 - Self::BITS;
+        Self { center, step: 2f64.powi(exponent) }
+    }
+
+    /// From object space.
+    pub fn from_object(&self, p: DVec3) -> DVec3 {
+        (p - self.center) / self.step
+    }
+
+    /// To object space.
+    pub fn to_object(&self, p: DVec3) -> DVec3 {
+        self.center + self.step * p
+    }
+}
+
+/// The plan of a quad whose ring is 3 x 3 quads without any tag.
+const REGULAR: NodeId = NodeId(u32::MAX);
+
+/// A mesh whose limit surface can be evaluated.
+#[derive(Debug)]
+pub struct Surface {
+    topology: Topology,
+    lattice: Lattice,
+    control: Vec<[f32; 3]>,
+    library: PlanLibrary,
+    plan_of_face: Vec<NodeId>,
+    /// First patch of each face, then the total; `None` if every face is one patch.
+    first_patch: Option<Vec<u32>>,
+}
+
+/// The points that decide one patch.
+#[derive(Debug)]
+pub struct PatchPoints {
+    patch: Option<PatchId>,
+    node: NodeId,
+    control: ControlPoints,
+    ring: Vec<Point>,
+    parent: Vec<Point>,
+}
+
+impl Default for PatchPoints {
+    fn default() -> Self {
+        Self { patch: None, node: REGULAR, control: [Point::ZERO; 16], ring: Vec::new(), parent: Vec::new() }
+    }
+}
+
+impl Surface {
+    /// Prepares a mesh, on `n_threads` threads.
+    pub fn new(mesh: &ControlMesh, n_threads: usize) -> Result<Self> {
+        let topology = Topology::new(mesh);
+        let lattice = Lattice::new(mesh.bounds());
+        let to_f32 = |p: &DVec3| lattice.from_object(*p).as_vec3().to_array();
+        let control = mesh.positions.iter().map(to_f32).collect();
+        let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
+        let (library, plan_of_face) = plan_faces(&topology, rules, n_threads.max(1));
+        let first_patch = (!topology.all_quads()).then(|| first_patches(&mesh.face_sizes));
+        if first_patch.as_ref().is_some_and(|f| f.last().is_some_and(|&n| n > u32::MAX / 2)) {
+            return Err(Error::input("the mesh has more than 2^31 patches: split it"));
+        }
+        Ok(Self { topology, lattice, control, library, plan_of_face, first_patch })
+    }
+
+    /// Half-edges and tags.
+    pub fn topology(&self) -> &Topology {
+        &self.topology
+    }
+
+    /// The plan library.
+    pub fn library(&self) -> &PlanLibrary {
+        &self.library
+    }
+
+    /// The vertex lattice.
+    pub fn lattice(&self) -> Lattice {
+        self.lattice
+    }
+
+    /// Number of patch ids, those of hidden faces included.
+    pub fn n_patches(&self) -> usize {
+        self.first_patch.as_ref().map_or(self.topology.n_faces(), |first| first[first.len() - 1] as usize)
+    }
+
+    /// The face of a patch and which of its sub-quads it is.
+    pub fn face_of(&self, patch: PatchId) -> (FaceId, u32) {
+        match &self.first_patch {
+            None => (FaceId(patch.0), 0),
+            Some(first) => {
+                let face = first.partition_point(|&p| p <= patch.0) - 1;
+                (FaceId(face as u32), patch.0 - first[face])
+            }
+        }
+    }
+
+    /// The patch of a face's sub-quad.
+    pub fn patch_of(&self, face: FaceId, sub: u32) -> PatchId {
+        PatchId(self.first_patch.as_ref().map_or(face.0, |first| first[face.idx()]) + sub)
+    }
+
+    /// Whether the patch has a surface.
+    pub fn is_visible(&self, patch: PatchId) -> bool {
+        !self.topology.is_hidden(self.face_of(patch).0)
+    }
+
+    /// Patches that have a surface.
+    pub fn visible_patches(&self) -> impl Iterator<Item = PatchId> {
+        (0..self.n_patches() as u32).map(PatchId).filter(|&p| self.is_visible(p))
+    }
+
+    /// Number of corners of a face.
+    pub fn face_size(&self, face: FaceId) -> u32 {
+        self.topology.face_corners(face.0).1
+    }
+
+    /// A control point in lattice units.
+    #[inline]
+    pub fn control_point(&self, vertex: u32) -> Point {
+        let [x, y, z] = self.control[vertex as usize];
+        Point::new(f64::from(x), f64::from(y), f64::from(z))
+    }
+
+    /// Bytes held, the plan library included.
+    pub fn bytes(&self) -> usize {
+        self.topology.bytes()
+            + 12 * self.control.len()
+            + self.library.bytes()
+            + 4 * self.plan_of_face.len()
+            + self.first_patch.as_ref().map_or(0, |f| 4 * f.len())
+    }
+
+    /// Fetches what decides a patch, unless `points` holds it already.
+    pub fn load(&self, patch: PatchId, points: &mut PatchPoints) {
+        if points.patch == Some(patch) {
+            return;
+        }
+        points.patch = Some(patch);
+        let (face, sub) = self.face_of(patch);
+        let (first, size) = self.topology.face_corners(face.0);
+        points.node = self.plan_of_face[face.idx()];
+        if points.node == REGULAR {
+            let vertices = regular_ring(&self.topology, first).expect("the plan says so");
+            points.control = vertices.map(|v| self.control_point(v));
+            return;
+        }
+        let sources = extract(&self.topology, first, self.library.outer_tags()).sources;
+        points.ring.clear();
+        if size == 4 {
+            points.ring.extend(sources.iter().map(|&v| self.control_point(v)));
+        } else {
+            points.parent.clear();
+            points.parent.extend(sources.iter().map(|&v| self.control_point(v)));
+            let (parent, ring) = (&points.parent, &mut points.ring);
+            points.node = Evaluator::child_ring(&self.library, points.node, parent, sub as usize, ring);
+        }
+    }
+
+    /// Positions on a tensor grid of parameters, in lattice units; see [`Evaluator::grid`].
+    pub fn grid(
+        &self,
+        points: &PatchPoints,
+        evaluator: &mut Evaluator,
+        us: impl IntoIterator<Item = f64>,
+        vs: impl IntoIterator<Item = f64>,
+        out: &mut [Point],
+    ) {
+        if points.node == REGULAR {
+            evaluator.regular_grid(&points.control, us, vs, out);
+        } else {
+            evaluator.grid(&self.library, points.node, &points.ring, us, vs, out);
+        }
+    }
+
+    /// Position and tangents in lattice units.
+    pub fn sample(&self, points: &PatchPoints, evaluator: &mut Evaluator, u: f64, v: f64) -> SurfaceSample {
+        if points.node == REGULAR {
+            sample_regular(&points.control, u, v)
+        } else {
+            evaluator.sample(&self.library, points.node, &points.ring, u, v)
+        }
+    }
+
+    /// The limit normal in lattice (and so object) space, along du x dv; zero where there is none.
+    pub fn normal(&self, points: &PatchPoints, evaluator: &mut Evaluator, u: f64, v: f64) -> DVec3 {
+        let sample = self.sample(points, evaluator, u, v);
+        if sample.kind == SampleKind::PositionOnly { DVec3::ZERO } else { sample.du.cross(sample.dv) }
+    }
+
+    /// A box in lattice units that holds part of a patch; see [`Evaluator::bounds`].
+    pub fn bounds(
+        &self,
+        points: &PatchPoints,
+        evaluator: &mut Evaluator,
+        u: [f64; 2],
+        v: [f64; 2],
+        depth: u32,
+    ) -> DBounds {
+        if points.node == REGULAR {
+            let mut bounds = DBounds::EMPTY;
+            grow_by_hull(&mut bounds, &points.control, u, v);
+            bounds
+        } else {
+            evaluator.bounds(&self.library, points.node, &points.ring, u, v, depth)
+        }
+    }
+}
+
+fn first_patches(sizes: &[u32]) -> Vec<u32> {
+    let mut total = 0u32;
+    let mut first: Vec<u32> = Vec::with_capacity(sizes.len() + 1);
+    for &n in sizes {
+        first.push(total);
+        total = total.saturating_add(if n == 4 { 1 } else { n });
+    }
+    first.push(total);
+    first
+}
+
+/// The 16 vertices around an untagged quad with regular corners, u fastest, by plain hops; `None` for other faces.
+fn regular_ring(topology: &Topology, first: u32) -> Option<[u32; 16]> {
+    if topology.face_corners(topology.face(first)).1 != 4 {
+        return None;
+    }
+    let mut out = [0; 16];
+    for k in 0..4u32 {
+        let h = first + k;
+        let v = topology.vertex(h);
+        let across = topology.twin(h);
+        if across == NONE || topology.is_tagged(v) || !is_quad(topology, across) {
+            return None;
+        }
+        let diagonal = topology.twin(topology.next(across));
+        if diagonal == NONE || !is_quad(topology, diagonal) {
+            return None;
+        }
+        // Valence 4: going on around the corner arrives in the face across the previous edge.
+        let beyond = topology.twin(topology.next(diagonal));
+        let before = topology.twin(topology.prev(h));
+        if beyond == NONE || before == NONE || topology.next(beyond) != before {
+            return None;
+        }
+        let left = topology.next(topology.next(across));
+        let mut set = |x: i32, y: i32, vertex: u32| {
+            let (i, j) = match k {
+                0 => (1 + x, 1 + y),
+                1 => (2 - y, 1 + x),
+                2 => (2 - x, 2 - y),
+                _ => (1 + y, 2 - x),
+            };
+            out[(4 * j + i) as usize] = vertex;
+        };
+        set(0, 0, v);
+        set(0, -1, topology.vertex(left));
+        set(1, -1, topology.vertex(topology.next(left)));
+        set(-1, -1, topology.vertex(topology.prev(diagonal)));
+    }
+    Some(out)
+}
+
+fn is_quad(topology: &Topology, h: u32) -> bool {
+    topology.face_corners(topology.face(h)).1 == 4
+}
+
+/// Faces a thread plans before it asks for more.
+const FACES_PER_TASK: usize = 4096;
+
+/// The plan of every visible face. Node numbers depend on which thread comes first; what they mean does not.
+fn plan_faces(topology: &Topology, rules: RuleSet, n_threads: usize) -> (PlanLibrary, Vec<NodeId>) {
+    let library = RwLock::new(PlanLibrary::new(rules));
+    let mut plans = vec![REGULAR; topology.n_faces()];
+    let tasks: Vec<_> = plans.chunks_mut(FACES_PER_TASK).enumerate().map(parking_lot::Mutex::new).collect();
+    let next = AtomicUsize::new(0);
+    let work = || {
+        while let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let (chunk, plans) = &mut *task.lock();
+            for (i, plan) in plans.iter_mut().enumerate() {
+                *plan = plan_face(topology, &library, FaceId::from(*chunk * FACES_PER_TASK + i));
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..n_threads.min(tasks.len()) {
+            scope.spawn(work);
+        }
+        work();
+    });
+    drop(tasks);
+    let mut library = library.into_inner();
+    library.seal();
+    (library, plans)
+}
+
+fn plan_face(topology: &Topology, library: &RwLock<PlanLibrary>, face: FaceId) -> NodeId {
+    let (first, _) = topology.face_corners(face.0);
+    if topology.is_hidden(face) || regular_ring(topology, first).is_some() {
+        return REGULAR;
+    }
+    let outer_tags = library.read().outer_tags();
+    let ring = extract(topology, first, outer_tags).mesh;
+    let known = library.read().find(&ring.key());
+    known.unwrap_or_else(|| library.write().node(&ring))
+}

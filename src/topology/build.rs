@@ -1,0 +1,490 @@
+//! Finding twins, and the decisions made once on the control mesh.
+
+use super::face_index::FaceIndex;
+use super::half_edges::{HalfEdges, NONE, VertexTags, fan, fan_size};
+use crate::ids::{FaceId, VertexId};
+use crate::mesh::{BoundaryRule, ControlMesh, CreaseMethod, TriangleRule};
+use rustc_hash::{FxHashMap, FxHashSet};
+
+/// Sharpness at and above which an edge or vertex is infinitely sharp (OpenSubdiv `Sdc::Crease::SHARPNESS_INFINITE`).
+const INFINITE_SHARPNESS: f32 = 10.0;
+
+/// Half-edges of a control mesh and the tags on them.
+#[derive(Debug)]
+pub struct Topology {
+    faces: FaceIndex,
+    vertex: Vec<VertexId>,
+    twin: Vec<u32>,
+    n_vertices: usize,
+    /// A bit per vertex: whether any tag or non-manifold spot touches it.
+    tagged: Vec<u64>,
+    /// Sharpness of tagged edges with a twin, by the smaller half-edge.
+    edge_sharpness: FxHashMap<u32, f32>,
+    /// Sharpness of tagged vertices.
+    vertex_sharpness: FxHashMap<u32, f32>,
+    /// Vertices whose faces do not form one fan or ring: their tags cannot be found by walking around them.
+    nonmanifold_tags: FxHashMap<u32, VertexTags>,
+    /// For half-edges of non-manifold edges: the smallest half-edge between the same vertices.
+    nonmanifold_edge_owner: FxHashMap<u32, u32>,
+    /// For non-manifold vertices: the smallest half-edge that starts there.
+    nonmanifold_vertex_owner: FxHashMap<u32, u32>,
+    /// A bit per face without surface, if there is any.
+    hidden: Option<Vec<u64>>,
+    /// How sharpness decays.
+    pub crease_method: CreaseMethod,
+    /// Edge weights beside triangles.
+    pub triangles: TriangleRule,
+}
+
+/// Counts for reports.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshCounts {
+    /// Edges with one face.
+    pub boundary_edges: usize,
+    /// Vertex pairs joined by non-manifold edges.
+    pub nonmanifold_edges: usize,
+    /// Vertices that are non-manifold.
+    pub nonmanifold_vertices: usize,
+    /// Faces without surface.
+    pub hidden_faces: usize,
+    /// Edges with a crease tag and two faces.
+    pub creased_edges: usize,
+}
+
+fn get_bit(bits: &[u64], i: u32) -> bool {
+    (bits[i as usize / 64] >> (i % 64)) & 1 == 1
+}
+
+fn set_bit(bits: &mut [u64], i: u32) {
+    bits[i as usize / 64] |= 1 << (i % 64);
+}
+
+fn clamp_sharpness(s: f32) -> f32 {
+    if s >= INFINITE_SHARPNESS { f32::INFINITY } else { s.max(0.0) }
+}
+
+impl Topology {
+    /// Half-edges and tags of a valid mesh.
+    pub fn new(mesh: &ControlMesh) -> Self {
+        let n_vertices = mesh.positions.len();
+        let mut topology = Topology {
+            faces: FaceIndex::new(&mesh.face_sizes),
+            vertex: mesh.face_vertices.clone(),
+            twin: vec![NONE; mesh.face_vertices.len()],
+            n_vertices,
+            tagged: vec![0; n_vertices / 64 + 1],
+            edge_sharpness: FxHashMap::default(),
+            vertex_sharpness: FxHashMap::default(),
+            nonmanifold_tags: FxHashMap::default(),
+            nonmanifold_edge_owner: FxHashMap::default(),
+            nonmanifold_vertex_owner: FxHashMap::default(),
+            hidden: None,
+            crease_method: mesh.crease_method,
+            triangles: mesh.triangles,
+        };
+        let by_vertex = HalfEdgesByVertex::new(&topology);
+        let nonmanifold = topology.pair_twins(&by_vertex);
+        let infinite = topology.tag_edges(mesh, &by_vertex);
+        drop(by_vertex);
+        topology.tag_vertices(mesh, &nonmanifold);
+        topology.hide_faces(mesh, &infinite);
+        topology
+    }
+
+    /// Pairs half-edges into manifold edges; returns the non-manifold edges.
+    fn pair_twins(&mut self, by_vertex: &HalfEdgesByVertex) -> Vec<NonmanifoldEdge> {
+        let mut nonmanifold = Vec::new();
+        let mut group: Vec<(u32, u32)> = Vec::new();
+        for v in 0..self.n_vertices as u32 {
+            group.clear();
+            group.extend(by_vertex.lower(v).iter().map(|&h| (self.upper_vertex(h), h)));
+            group.sort_unstable();
+            for edge in group.chunk_by(|a, b| a.0 == b.0) {
+                match *edge {
+                    [(w, _)] if w != v => {}
+                    [(w, a), (_, b)] if w != v && self.can_be_twins(a, b) => {
+                        self.twin[a as usize] = b;
+                        self.twin[b as usize] = a;
+                    }
+                    _ => self.add_nonmanifold(edge, &mut nonmanifold),
+                }
+            }
+        }
+        nonmanifold
+    }
+
+    fn can_be_twins(&self, a: u32, b: u32) -> bool {
+        self.vertex[a as usize] != self.vertex[b as usize] && self.faces.face(a) != self.faces.face(b)
+    }
+
+    /// Splits the half-edges between one pair of vertices into edges: the first holds each face's first passage; every
+    /// further passage of a face, and every edge from a vertex to itself, is an edge of its own.
+    fn add_nonmanifold(&mut self, group: &[(u32, u32)], nonmanifold: &mut Vec<NonmanifoldEdge>) {
+        let owner = group[0].1;
+        let ends = [self.vertex[owner as usize].0, self.vertex[HalfEdges::next(self, owner) as usize].0];
+        let mut shared = NonmanifoldEdge { ends, n_faces: 0 };
+        let mut last_face = NONE;
+        for &(_, h) in group {
+            self.nonmanifold_edge_owner.insert(h, owner);
+            let face = self.faces.face(h);
+            if ends[0] == ends[1] || face == last_face {
+                nonmanifold.push(NonmanifoldEdge { ends, n_faces: 1 });
+            } else {
+                shared.n_faces += 1;
+            }
+            last_face = face;
+        }
+        if shared.n_faces > 0 {
+            nonmanifold.push(shared);
+        }
+    }
+
+    fn upper_vertex(&self, h: u32) -> u32 {
+        self.vertex[h as usize].0.max(self.vertex[HalfEdges::next(self, h) as usize].0)
+    }
+
+    /// Applies crease tags; returns the vertex pairs that a tag made infinitely sharp.
+    fn tag_edges(&mut self, mesh: &ControlMesh, by_vertex: &HalfEdgesByVertex) -> FxHashSet<[u32; 2]> {
+        let mut infinite = FxHashSet::default();
+        for crease in &mesh.creases {
+            let [a, b] = [crease.edge[0].0.min(crease.edge[1].0), crease.edge[0].0.max(crease.edge[1].0)];
+            let sharpness = clamp_sharpness(crease.sharpness);
+            if sharpness == f32::INFINITY {
+                infinite.insert([a, b]);
+            } else {
+                infinite.remove(&[a, b]);
+            }
+            for &h in by_vertex.lower(a) {
+                if self.upper_vertex(h) == b && self.twin[h as usize] != NONE {
+                    self.edge_sharpness.insert(h.min(self.twin[h as usize]), sharpness);
+                    set_bit(&mut self.tagged, a);
+                    set_bit(&mut self.tagged, b);
+                }
+            }
+        }
+        self.edge_sharpness.retain(|_, s| *s > 0.0);
+        infinite
+    }
+
+    fn tag_vertices(&mut self, mesh: &ControlMesh, nonmanifold: &[NonmanifoldEdge]) {
+        for corner in &mesh.corners {
+            self.set_vertex_sharpness(corner.vertex.0, clamp_sharpness(corner.sharpness));
+        }
+        let mut edges_at: FxHashMap<u32, Vec<NonmanifoldEdge>> = FxHashMap::default();
+        for edge in nonmanifold {
+            edges_at.entry(edge.ends[0]).or_default().push(*edge);
+            if edge.ends[0] != edge.ends[1] {
+                edges_at.entry(edge.ends[1]).or_default().push(*edge);
+            }
+        }
+        let mut outgoing = self.spokes_of_nonmanifold_vertices(mesh, &edges_at);
+        for (v, spokes) in outgoing.drain() {
+            self.tag_nonmanifold_vertex(v, &spokes, edges_at.get(&v).map_or(&[], Vec::as_slice));
+        }
+    }
+
+    /// The vertices whose faces do not form one fan or ring, each with the half-edges that start there. On the way,
+    /// boundary rule 1 makes vertices of a single face sharp.
+    fn spokes_of_nonmanifold_vertices(
+        &mut self,
+        mesh: &ControlMesh,
+        edges_at: &FxHashMap<u32, Vec<NonmanifoldEdge>>,
+    ) -> FxHashMap<u32, Vec<u32>> {
+        let mut n_corners = vec![0u32; self.n_vertices];
+        self.vertex.iter().for_each(|v| n_corners[v.idx()] += 1);
+        let mut spokes: FxHashMap<u32, Vec<u32>> = edges_at.keys().map(|&v| (v, Vec::new())).collect();
+        for h in 0..self.vertex.len() as u32 {
+            let v = self.vertex[h as usize];
+            let n = std::mem::take(&mut n_corners[v.idx()]);
+            if n == 0 || spokes.contains_key(&v.0) {
+                continue;
+            }
+            match fan_size(self, h) {
+                (1, false) if n == 1 && mesh.boundary == BoundaryRule::EdgeAndCorner => {
+                    self.set_vertex_sharpness(v.0, f32::INFINITY);
+                }
+                (size, _) if size != n as usize => {
+                    spokes.insert(v.0, Vec::new());
+                }
+                _ => {}
+            }
+        }
+        if !spokes.is_empty() {
+            for h in 0..self.vertex.len() as u32 {
+                if let Some(list) = spokes.get_mut(&self.vertex[h as usize].0) {
+                    list.push(h);
+                }
+            }
+        }
+        spokes
+    }
+
+    fn set_vertex_sharpness(&mut self, v: u32, sharpness: f32) {
+        set_bit(&mut self.tagged, v);
+        self.vertex_sharpness.insert(v, sharpness);
+    }
+
+    /// Infinitely sharp, unless the vertex is an inner vertex of a fin: exactly two non-manifold edges, no boundary
+    /// edge, more faces than edges.
+    fn tag_nonmanifold_vertex(&mut self, v: u32, outgoing: &[u32], nonmanifold: &[NonmanifoldEdge]) {
+        let mut tags = VertexTags { n_infinite: nonmanifold.len() as u32, ..Default::default() };
+        let mut n_boundary = nonmanifold.iter().filter(|e| e.n_faces < 2).count();
+        let mut n_edges = nonmanifold.len();
+        for &spoke in outgoing {
+            for h in [spoke, HalfEdges::prev(self, spoke)] {
+                let twin = self.twin[h as usize];
+                if twin == NONE && !self.nonmanifold_edge_owner.contains_key(&h) {
+                    n_boundary += 1;
+                    n_edges += 1;
+                    tags.n_infinite += 1;
+                } else if twin != NONE && h == spoke {
+                    n_edges += 1;
+                    match self.edge_sharpness.get(&h.min(twin)).copied().unwrap_or(0.0) {
+                        f32::INFINITY => tags.n_infinite += 1,
+                        s if s > 0.0 => tags.semi_sharp.push(s),
+                        _ => {}
+                    }
+                }
+            }
+        }
+        tags.semi_sharp.sort_by(f32::total_cmp);
+        let is_fin = nonmanifold.len() == 2 && n_boundary == 0 && outgoing.len() > n_edges;
+        if !is_fin {
+            self.set_vertex_sharpness(v, f32::INFINITY);
+        }
+        set_bit(&mut self.tagged, v);
+        tags.sharpness = self.vertex_sharpness.get(&v).copied().unwrap_or(0.0);
+        self.nonmanifold_tags.insert(v, tags);
+        if let Some(&owner) = outgoing.iter().min() {
+            self.nonmanifold_vertex_owner.insert(v, owner);
+        }
+    }
+
+    fn hide_faces(&mut self, mesh: &ControlMesh, infinite: &FxHashSet<[u32; 2]>) {
+        if mesh.holes.is_empty() && mesh.boundary != BoundaryRule::None {
+            return;
+        }
+        let mut hidden = vec![0u64; mesh.n_faces() / 64 + 1];
+        for face in &mesh.holes {
+            set_bit(&mut hidden, face.0);
+        }
+        if mesh.boundary == BoundaryRule::None {
+            let open = self.vertices_of_untagged_boundaries(infinite);
+            for (h, v) in self.vertex.iter().enumerate() {
+                if get_bit(&open, v.0) {
+                    set_bit(&mut hidden, self.faces.face(h as u32));
+                }
+            }
+        }
+        self.hidden = hidden.iter().any(|&w| w != 0).then_some(hidden);
+    }
+
+    fn vertices_of_untagged_boundaries(&self, infinite: &FxHashSet<[u32; 2]>) -> Vec<u64> {
+        let mut open = vec![0u64; self.n_vertices / 64 + 1];
+        for h in 0..self.twin.len() as u32 {
+            let [a, b] = [self.vertex[h as usize].0, self.vertex[HalfEdges::next(self, h) as usize].0];
+            if self.is_boundary(h) && !infinite.contains(&[a.min(b), a.max(b)]) {
+                set_bit(&mut open, a);
+                set_bit(&mut open, b);
+            }
+        }
+        open
+    }
+
+    /// Whether the edge of `h` has one face and is otherwise sound.
+    pub fn is_boundary(&self, h: u32) -> bool {
+        self.twin[h as usize] == NONE && !self.nonmanifold_edge_owner.contains_key(&h)
+    }
+
+    /// Number of faces, hidden ones included.
+    pub fn n_faces(&self) -> usize {
+        self.faces.n_faces()
+    }
+
+    /// Number of half-edges.
+    pub fn n_half_edges(&self) -> usize {
+        self.vertex.len()
+    }
+
+    /// Number of vertices, bare ones included.
+    pub fn n_vertices(&self) -> usize {
+        self.n_vertices
+    }
+
+    /// Whether all faces are quads.
+    pub fn all_quads(&self) -> bool {
+        matches!(self.faces, FaceIndex::Quads { .. })
+    }
+
+    /// Whether the face has no surface.
+    pub fn is_hidden(&self, face: FaceId) -> bool {
+        self.hidden.as_ref().is_some_and(|bits| get_bit(bits, face.0))
+    }
+
+    /// Whether anything but plain smooth rules may apply at `v`, boundaries aside.
+    #[inline]
+    pub fn is_tagged(&self, v: u32) -> bool {
+        get_bit(&self.tagged, v)
+    }
+
+    /// The half-edge in whose name points of this edge are computed when neighbours must agree to the bit: the smallest
+    /// one along the edge whose face has a surface.
+    pub fn edge_owner(&self, h: u32) -> u32 {
+        let visible = |h: u32| !self.is_hidden(FaceId(self.faces.face(h)));
+        let twin = self.twin[h as usize];
+        if twin != NONE {
+            return if visible(twin) { h.min(twin) } else { h };
+        }
+        match self.nonmanifold_edge_owner.get(&h) {
+            Some(&owner) if visible(owner) => owner,
+            _ => h,
+        }
+    }
+
+    /// The half-edge in whose name the limit of the vertex at the start of `h` is computed.
+    pub fn vertex_owner(&self, h: u32) -> u32 {
+        let visible = |h: &u32| !self.is_hidden(FaceId(self.faces.face(*h)));
+        if let Some(&owner) = self.nonmanifold_vertex_owner.get(&self.vertex[h as usize].0) {
+            return if visible(&owner) { owner } else { h };
+        }
+        let fan = fan(self, h, |h| self.twin[h as usize] == NONE);
+        fan.spokes.into_iter().filter(visible).min().unwrap_or(h)
+    }
+
+    /// Whether a face that is no quad lies along the edge of `h`, on either side.
+    pub fn touches_polygon(&self, h: u32) -> bool {
+        let is_polygon = |h: u32| self.faces.corners(self.faces.face(h)).1 != 4;
+        let twin = self.twin[h as usize];
+        if self.all_quads() {
+            return false;
+        }
+        is_polygon(h) || (twin != NONE && is_polygon(twin)) || self.nonmanifold_edge_owner.contains_key(&h)
+    }
+
+    /// Counts for reports.
+    pub fn counts(&self) -> MeshCounts {
+        let hidden = self.hidden.as_ref().map_or(0, |bits| bits.iter().map(|w| w.count_ones() as usize).sum());
+        let owners: FxHashSet<u32> = self.nonmanifold_edge_owner.values().copied().collect();
+        MeshCounts {
+            boundary_edges: (0..self.twin.len() as u32).filter(|&h| self.is_boundary(h)).count(),
+            nonmanifold_edges: owners.len(),
+            nonmanifold_vertices: self.nonmanifold_tags.len(),
+            hidden_faces: hidden,
+            creased_edges: self.edge_sharpness.len(),
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let maps = 8 * (self.edge_sharpness.capacity() + self.vertex_sharpness.capacity())
+            + 8 * (self.nonmanifold_edge_owner.capacity() + self.nonmanifold_vertex_owner.capacity())
+            + 48 * self.nonmanifold_tags.capacity();
+        let bits = 8 * (self.tagged.len() + self.hidden.as_ref().map_or(0, Vec::len));
+        self.faces.bytes() + 4 * (self.vertex.len() + self.twin.len()) + bits + maps
+    }
+
+    /// Tags of a vertex whose faces form one fan or ring, found by walking around it.
+    fn walk_tags(&self, h: u32) -> VertexTags {
+        let v = self.vertex[h as usize].0;
+        if !self.is_tagged(v) {
+            let (_, closed) = fan_size(self, h);
+            return VertexTags { n_infinite: if closed { 0 } else { 2 }, ..Default::default() };
+        }
+        let fan = fan(self, h, |h| self.twin[h as usize] == NONE);
+        let mut tags = VertexTags {
+            sharpness: self.vertex_sharpness.get(&v).copied().unwrap_or(0.0),
+            n_infinite: if fan.closed { 0 } else { 2 },
+            semi_sharp: Vec::new(),
+        };
+        for &spoke in fan.spokes.iter().filter(|&&h| self.twin[h as usize] != NONE) {
+            match self.edge_sharpness(spoke) {
+                f32::INFINITY => tags.n_infinite += 1,
+                s if s > 0.0 => tags.semi_sharp.push(s),
+                _ => {}
+            }
+        }
+        tags.semi_sharp.sort_by(f32::total_cmp);
+        tags
+    }
+}
+
+impl HalfEdges for Topology {
+    #[inline]
+    fn vertex(&self, h: u32) -> u32 {
+        self.vertex[h as usize].0
+    }
+
+    #[inline]
+    fn twin(&self, h: u32) -> u32 {
+        self.twin[h as usize]
+    }
+
+    #[inline]
+    fn face(&self, h: u32) -> u32 {
+        self.faces.face(h)
+    }
+
+    #[inline]
+    fn face_corners(&self, face: u32) -> (u32, u32) {
+        self.faces.corners(face)
+    }
+
+    #[inline]
+    fn edge_sharpness(&self, h: u32) -> f32 {
+        let twin = self.twin[h as usize];
+        if twin == NONE {
+            f32::INFINITY
+        } else if !self.is_tagged(self.vertex[h as usize].0) {
+            0.0
+        } else {
+            self.edge_sharpness.get(&h.min(twin)).copied().unwrap_or(0.0)
+        }
+    }
+
+    fn vertex_tags(&self, h: u32) -> VertexTags {
+        match self.nonmanifold_tags.get(&self.vertex[h as usize].0) {
+            Some(tags) => tags.clone(),
+            None => self.walk_tags(h),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct NonmanifoldEdge {
+    ends: [u32; 2],
+    n_faces: u32,
+}
+
+/// For each vertex, the half-edges whose smaller end it is.
+struct HalfEdgesByVertex {
+    start: Vec<u32>,
+    half_edges: Vec<u32>,
+}
+
+impl HalfEdgesByVertex {
+    fn new(topology: &Topology) -> Self {
+        let n_half_edges = topology.vertex.len() as u32;
+        let lower = |h: u32| {
+            let next = HalfEdges::next(topology, h);
+            topology.vertex[h as usize].0.min(topology.vertex[next as usize].0) as usize
+        };
+        let mut start = vec![0u32; topology.n_vertices + 2];
+        for h in 0..n_half_edges {
+            start[lower(h) + 2] += 1;
+        }
+        for v in 2..start.len() {
+            start[v] += start[v - 1];
+        }
+        let mut half_edges = vec![0u32; n_half_edges as usize];
+        for h in 0..n_half_edges {
+            let cursor = &mut start[lower(h) + 1];
+            half_edges[*cursor as usize] = h;
+            *cursor += 1;
+        }
+        Self { start, half_edges }
+    }
+
+    fn lower(&self, v: u32) -> &[u32] {
+        &self.half_edges[self.start[v as usize] as usize..self.start[v as usize + 1] as usize]
+    }
+}

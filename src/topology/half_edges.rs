@@ -1,0 +1,105 @@
+//! What subdivision asks of a mesh, whether it is the whole control mesh or a small refined neighbourhood.
+
+/// "No such half-edge".
+pub const NONE: u32 = u32::MAX;
+
+/// Sharpness at a vertex.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct VertexTags {
+    /// The vertex's own sharpness: 0 smooth, finite semi-sharp, infinite corner.
+    pub sharpness: f32,
+    /// Number of infinitely sharp edges at the vertex, all sectors counted.
+    pub n_infinite: u32,
+    /// Sharpness of the semi-sharp edges at the vertex, all sectors counted, ascending.
+    pub semi_sharp: Vec<f32>,
+}
+
+impl VertexTags {
+    /// Number of sharp edges, semi-sharp or infinite.
+    pub fn n_sharp(&self) -> usize {
+        self.n_infinite as usize + self.semi_sharp.len()
+    }
+}
+
+/// A mesh of half-edges, by plain index.
+pub trait HalfEdges {
+    /// The vertex where `h` starts.
+    fn vertex(&self, h: u32) -> u32;
+    /// The other side of the edge, or [`NONE`].
+    fn twin(&self, h: u32) -> u32;
+    /// The face of `h`.
+    fn face(&self, h: u32) -> u32;
+    /// The first half-edge of a face and its number of corners.
+    fn face_corners(&self, face: u32) -> (u32, u32);
+    /// Sharpness of the edge of `h`.
+    fn edge_sharpness(&self, h: u32) -> f32;
+    /// Tags of the vertex where `h` starts.
+    fn vertex_tags(&self, h: u32) -> VertexTags;
+
+    /// The next half-edge of the face.
+    #[inline]
+    fn next(&self, h: u32) -> u32 {
+        let (start, n) = self.face_corners(self.face(h));
+        if h + 1 == start + n { start } else { h + 1 }
+    }
+
+    /// The previous half-edge of the face.
+    #[inline]
+    fn prev(&self, h: u32) -> u32 {
+        let (start, n) = self.face_corners(self.face(h));
+        if h == start { start + n - 1 } else { h - 1 }
+    }
+}
+
+/// The faces around a vertex that are reached without crossing a border.
+#[derive(Clone, Debug)]
+pub struct Fan {
+    /// Outgoing half-edges, counter-clockwise; one per face.
+    pub spokes: Vec<u32>,
+    /// Whether the fan closes into a ring. If not, one more edge follows: the one that arrives in the last face.
+    pub closed: bool,
+}
+
+/// The sector of `h`'s face at the vertex where `h` starts, bounded by edges for which `is_border` holds.
+pub fn fan<M: HalfEdges + ?Sized>(mesh: &M, h: u32, is_border: impl Fn(u32) -> bool) -> Fan {
+    let mut spokes = vec![h];
+    loop {
+        let arriving = mesh.prev(*spokes.last().expect("a fan has a spoke"));
+        if is_border(arriving) {
+            break;
+        }
+        let spoke = mesh.twin(arriving);
+        if spoke == h {
+            return Fan { spokes, closed: true };
+        }
+        spokes.push(spoke);
+    }
+    let mut before = Vec::new();
+    let mut spoke = h;
+    while !is_border(spoke) {
+        spoke = mesh.next(mesh.twin(spoke));
+        before.push(spoke);
+    }
+    before.reverse();
+    before.extend(spokes);
+    Fan { spokes: before, closed: false }
+}
+
+/// Number of faces in the fan of `h` over twins, and whether it is closed; as [`fan`], without collecting.
+pub fn fan_size<M: HalfEdges + ?Sized>(mesh: &M, h: u32) -> (usize, bool) {
+    let mut n = 1;
+    let mut spoke = mesh.twin(mesh.prev(h));
+    while spoke != NONE {
+        if spoke == h {
+            return (n, true);
+        }
+        n += 1;
+        spoke = mesh.twin(mesh.prev(spoke));
+    }
+    let mut across = mesh.twin(h);
+    while across != NONE {
+        n += 1;
+        across = mesh.twin(mesh.next(across));
+    }
+    (n, false)
+}
