@@ -207,6 +207,7 @@ impl PlanLibrary {
 
     fn limit(&self, id: NodeId, ring: &LocalMesh, rows: &SparseRows, child: &Child, k: u32) -> Limit {
         match rules::corner_limit(ring, k) {
+            CornerLimit::Regular => Limit::Regular,
             CornerLimit::Position(row) => Limit::Position(SparseRows::new([&row])),
             CornerLimit::Smooth(position, [along, next]) => {
                 let negated = |row: &Row| -> Row { row.iter().map(|&(p, w)| (p, -w)).collect() };

@@ -198,6 +198,8 @@ fn smooth_vertex(mesh: &LocalMesh, v: u32, spokes: &[u32], edges: &[(u32, u32)])
 /// What is known of the limit at a corner of the target.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CornerLimit {
+    /// The surface is regular there.
+    Regular,
     /// Semi-sharp or beside a polygon: ask the corner's quarter.
     Descend,
     /// The limit is this row.
@@ -213,15 +215,18 @@ pub enum CornerLimit {
 pub fn corner_limit(mesh: &LocalMesh, h: u32) -> CornerLimit {
     let v = mesh.vertex(h);
     let tags = mesh.tags_at(h);
-    let forever_corner = tags.sharpness == f32::INFINITY || tags.n_infinite > 2;
-    if forever_corner {
+    let fan = mesh.fan(h);
+    let all_quads = fan.spokes.iter().all(|&s| mesh.face_corners(mesh.face(s)).1 == 4);
+    if all_quads && is_regular_corner(mesh, h) {
+        return CornerLimit::Regular;
+    }
+    if is_corner_forever(tags) {
         return CornerLimit::Position(vec![(v, 1.0)]);
     }
     if tags.sharpness > 0.0 || !tags.semi_sharp.is_empty() {
         return CornerLimit::Descend;
     }
-    let fan = mesh.fan(h);
-    if fan.spokes.iter().any(|&s| mesh.face_corners(mesh.face(s)).1 != 4) {
+    if !all_quads {
         return CornerLimit::Descend;
     }
     let edges = mesh.fan_edges(&fan);
@@ -282,7 +287,7 @@ pub fn regular_rows(mesh: &LocalMesh) -> Option<[[Row; 4]; 4]> {
             }
         }
     }
-    grid.extrapolate();
+    grid.extrapolate([0, 1, 2, 3].map(|k| is_sharp(mesh, k)));
     Some(grid.rows.map(|row| row.map(|p| p.expect("every control point is given or extrapolated"))))
 }
 
@@ -290,12 +295,16 @@ fn is_sharp(mesh: &LocalMesh, h: u32) -> bool {
     mesh.edge_sharpness(h) == f32::INFINITY
 }
 
+/// Whether the corner mask holds at every level to come.
+fn is_corner_forever(tags: &VertexTags) -> bool {
+    tags.sharpness == f32::INFINITY || tags.n_infinite > 2
+}
+
 fn is_regular_corner(mesh: &LocalMesh, h: u32) -> bool {
     let tags = mesh.tags_at(h);
     let fan = mesh.fan(h);
-    let forever_corner = tags.sharpness == f32::INFINITY || tags.n_infinite > 2;
     match (fan.spokes.len(), fan.closed) {
-        (1, false) => forever_corner,
+        (1, false) => is_corner_forever(tags),
         (2, false) => tags.sharpness == 0.0 && tags.n_infinite == 2 && tags.semi_sharp.is_empty(),
         (4, true) => tags.sharpness == 0.0 && tags.n_infinite == 0 && tags.semi_sharp.is_empty(),
         _ => false,
@@ -319,19 +328,21 @@ impl ControlGrid {
         self.rows[j as usize][i as usize] = Some(vec![(vertex, 1.0)]);
     }
 
-    /// Points beyond sharp edges mirror those before: P(-1) = 2 P(0) - P(1).
-    fn extrapolate(&mut self) {
+    /// Points beyond sharp edges mirror those before: P(-1) = 2 P(0) - P(1). `sharp` tells of each edge.
+    fn extrapolate(&mut self, sharp: [bool; 4]) {
         let mirror = |near: &Option<Row>, far: &Option<Row>| -> Option<Row> {
             Some(merge(scaled(near.as_ref()?, 2.0).chain(scaled(far.as_ref()?, -1.0)).collect()))
         };
         for _ in 0..2 {
-            for j in 0..4 {
-                for (i, near, far) in [(0, 1, 2), (3, 2, 1)] {
-                    if self.rows[j][i].is_none() {
-                        self.rows[j][i] = mirror(&self.rows[j][near], &self.rows[j][far]);
+            for k in 0..4 {
+                for (edge, beyond, near, far) in [(0, 0, 1, 2), (2, 3, 2, 1)] {
+                    if sharp[edge] && self.rows[beyond][k].is_none() {
+                        self.rows[beyond][k] = mirror(&self.rows[near][k], &self.rows[far][k]);
                     }
-                    if self.rows[i][j].is_none() {
-                        self.rows[i][j] = mirror(&self.rows[near][j], &self.rows[far][j]);
+                }
+                for (edge, beyond, near, far) in [(3, 0, 1, 2), (1, 3, 2, 1)] {
+                    if sharp[edge] && self.rows[k][beyond].is_none() {
+                        self.rows[k][beyond] = mirror(&self.rows[k][near], &self.rows[k][far]);
                     }
                 }
             }

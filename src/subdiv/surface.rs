@@ -269,7 +269,8 @@ fn regular_ring(topology: &Topology, first: u32) -> Option<[u32; 16]> {
             return None;
         }
         let diagonal = topology.twin(topology.next(across));
-        if diagonal == NONE || !is_quad(topology, diagonal) {
+        let is_valence_two = diagonal == topology.prev(h);
+        if diagonal == NONE || is_valence_two || !is_quad(topology, diagonal) {
             return None;
         }
         // Valence 4: going on around the corner arrives in the face across the previous edge.
