@@ -16,8 +16,8 @@
 //! Modules in reading order: [`mesh`], [`topology`], [`subdiv`], [`grid`], [`cache`], [`scene`], [`render`],
 //! [`image`], [`report`], [`io`], [`cli`].
 
-pub mod cli;
 pub mod cache;
+pub mod cli;
 pub mod error;
 pub mod ids;
 pub mod io;
