@@ -19,6 +19,7 @@
 pub mod cache;
 pub mod cli;
 pub mod error;
+pub mod grid;
 pub mod ids;
 pub mod io;
 pub mod math;

@@ -1,7 +1,8 @@
-//! Small mathematics that the rest shares: boxes and rays. Vectors are glam's.
+//! Small mathematics that the rest shares: boxes, rays and lanes of eight floats. Vectors are glam's.
 
 mod bounds;
 mod ray;
+pub mod simd;
 
 pub use bounds::{Bounds, DBounds};
 pub use ray::{Hit, Intersect, PrimitiveRef, Ray};

@@ -2,4 +2,5 @@
 //!
 //! A [`description::SceneDescription`] is what the user wrote, checked but with no mesh read.
 
+pub mod accel;
 pub mod description;

@@ -1,0 +1,192 @@
+//! The head that pieces and nodes share: sixteen 8-bit boxes relative to one corner, and the test of a ray against them.
+
+use super::LatticeRay;
+use crate::math::simd::Kernel;
+use bytemuck::{Pod, Zeroable};
+
+/// Bytes of the head at the start of every block.
+pub const HEAD_BYTES: usize = 128;
+
+/// The cells i0 <= i < i1, j0 <= j < j1 of a patch's grid.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct CellRect {
+    /// First cell along u.
+    pub i0: u16,
+    /// First cell along v.
+    pub j0: u16,
+    /// One past the last cell along u.
+    pub i1: u16,
+    /// One past the last cell along v.
+    pub j1: u16,
+}
+
+impl CellRect {
+    /// Cells along u and v.
+    pub fn size(self) -> [usize; 2] {
+        [usize::from(self.i1 - self.i0), usize::from(self.j1 - self.j0)]
+    }
+}
+
+/// Boxes of up to 4x4 things. Thing (a, b) is **lane** 4 b + a.
+///
+/// Plane q of axis k is at `base[k] + q * 2^exponent[k]`: an integer, so a box is exact but for being rounded outwards to whole steps.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Head {
+    pub base: [i32; 3],
+    pub exponent: [u8; 3],
+    /// Bytes of a vertex coordinate; 0 in a node.
+    pub format: u8,
+    /// Things along u and v, 1 to 4 each.
+    pub lanes: [u8; 2],
+    padding: [u8; 2],
+    pub cells: CellRect,
+    padding_2: [u8; 4],
+    /// Low planes of x, y, z, then high planes.
+    planes: [[u8; 16]; 6],
+}
+
+const _: () = assert!(size_of::<Head>() == HEAD_BYTES);
+
+/// The lanes of a 4x4 arrangement that `lanes` = [along u, along v] of them use, as bits.
+#[inline(always)]
+pub fn lane_mask(lanes: [u8; 2]) -> u32 {
+    let row = (1u32 << lanes[0].min(4)) - 1;
+    (row * 0x1111) & ((1u32 << (4 * u32::from(lanes[1].min(4)))) - 1)
+}
+
+/// A box of lattice points: low and high corner, both inside.
+pub(super) type IntegerBox = [[i32; 3]; 2];
+
+/// The smallest box around both.
+#[inline(always)]
+pub(super) fn union(a: IntegerBox, b: IntegerBox) -> IntegerBox {
+    [std::array::from_fn(|k| a[0][k].min(b[0][k])), std::array::from_fn(|k| a[1][k].max(b[1][k]))]
+}
+
+/// The exponent of the smallest power-of-two step of which 255 reach `extent`.
+#[inline(always)]
+fn step_exponent(extent: u32) -> u32 {
+    let shift = (u32::BITS - extent.leading_zeros()).saturating_sub(8);
+    shift + u32::from(extent.div_ceil(1 << shift) > 255)
+}
+
+impl Head {
+    /// A head whose lane k, for every bit k of `lane_mask(lanes)`, has the box `boxes[k]`; the others are not looked at.
+    /// `whole` is the box around them all, with coordinates up to 2^24.
+    #[inline(always)]
+    pub fn new(whole: IntegerBox, boxes: &[IntegerBox; 16], lanes: [u8; 2], cells: CellRect, format: u8) -> Self {
+        let extent: [u32; 3] = std::array::from_fn(|k| (whole[1][k] - whole[0][k]) as u32);
+        let exponent = extent.map(step_exponent);
+        let mut planes = [[0; 16]; 6];
+        for k in 0..3 {
+            let up = (1u32 << exponent[k]) - 1;
+            for lane in 0..16 {
+                // Lanes that are not used may wrap around: they are masked after every test.
+                planes[k][lane] = ((boxes[lane][0][k].wrapping_sub(whole[0][k]) as u32) >> exponent[k]) as u8;
+                let high = boxes[lane][1][k].wrapping_sub(whole[0][k]) as u32;
+                planes[k + 3][lane] = (high.wrapping_add(up) >> exponent[k]) as u8;
+            }
+        }
+        let exponent = exponent.map(|e| e as u8);
+        Self { base: whole[0], exponent, format, lanes, padding: [0; 2], cells, padding_2: [0; 4], planes }
+    }
+
+    /// The box of a lane as it is tested, without the ray's slack.
+    #[cfg(test)]
+    pub fn decoded_box(&self, lane: usize) -> IntegerBox {
+        let plane = |k: usize, q: u8| self.base[k] + (i32::from(q) << self.exponent[k]);
+        [
+            std::array::from_fn(|k| plane(k, self.planes[k][lane])),
+            std::array::from_fn(|k| plane(k, self.planes[k + 3][lane])),
+        ]
+    }
+
+    /// The lanes whose box the ray meets between 0 and `t_max`.
+    #[inline(always)]
+    pub fn test<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> LaneHits {
+        let mut t_near = [0.0; 16];
+        let slabs = Slabs::new(self, ray);
+        let (low, low_t) = slabs.test(kernel, self, 0, t_max);
+        let (high, high_t) = slabs.test(kernel, self, 8, t_max);
+        t_near[..8].copy_from_slice(&low_t);
+        t_near[8..].copy_from_slice(&high_t);
+        LaneHits { mask: (low | high << 8) & lane_mask(self.lanes), t_near }
+    }
+}
+
+/// What a ray makes of a head: t of plane q of axis k is `q * step[k] + near[k]` (or `far`), see [`LatticeRay`].
+struct Slabs {
+    step: [f32; 3],
+    near: [f32; 3],
+    far: [f32; 3],
+    /// Index into `Head::planes`.
+    near_plane: [usize; 3],
+}
+
+impl Slabs {
+    #[inline(always)]
+    fn new(head: &Head, ray: &LatticeRay) -> Self {
+        let base = head.base.map(|b| b as f32);
+        Self {
+            step: std::array::from_fn(|k| f32::from_bits((127 + u32::from(head.exponent[k])) << 23) * ray.inv[k]),
+            near: std::array::from_fn(|k| (base[k] - ray.near_origin[k]) * ray.inv[k]),
+            far: std::array::from_fn(|k| (base[k] - ray.far_origin[k]) * ray.inv[k]),
+            near_plane: std::array::from_fn(|k| k + 3 * ray.is_negative[k]),
+        }
+    }
+
+    /// The test of the eight lanes from `first` (0 or 8): their bits, and where the ray enters.
+    #[inline(always)]
+    fn test<K: Kernel>(&self, kernel: K, head: &Head, first: usize, t_max: f32) -> (u32, [f32; 8]) {
+        let (mut enter, mut leave) = (kernel.splat(0.0), kernel.splat(t_max));
+        for k in 0..3 {
+            let step = kernel.splat(self.step[k]);
+            let t = |plane: usize, offset: f32| {
+                let q: &[u8; 8] = head.planes[plane][first..first + 8].try_into().expect("eight lanes");
+                kernel.add(kernel.mul(kernel.widen(q), step), kernel.splat(offset))
+            };
+            let near = self.near_plane[k];
+            enter = kernel.max(t(near, self.near[k]), enter);
+            leave = kernel.min(t((near + 3) % 6, self.far[k]), leave);
+        }
+        (kernel.le(enter, leave), kernel.store(enter))
+    }
+}
+
+/// The lanes of a block that a ray meets, and where it enters each.
+#[derive(Clone, Copy, Debug)]
+pub struct LaneHits {
+    /// Bit k is set if lane k is met.
+    pub mask: u32,
+    /// Ray parameter at which the box of lane k is entered, at least 0; only for lanes in `mask`.
+    pub t_near: [f32; 16],
+}
+
+impl LaneHits {
+    /// Takes out the lane that is entered first, if it is not beyond `t_max`.
+    #[inline(always)]
+    pub fn pop_nearest(&mut self, t_max: f32) -> Option<usize> {
+        let mut nearest = self.mask.trailing_zeros() as usize;
+        if nearest == 32 {
+            return None;
+        }
+        let mut rest = self.mask & (self.mask - 1);
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize;
+            nearest = if self.t_near[lane] < self.t_near[nearest] { lane } else { nearest };
+            rest &= rest - 1;
+        }
+        self.mask &= !(1 << nearest);
+        (self.t_near[nearest] <= t_max).then_some(nearest)
+    }
+
+    /// Takes out any lane.
+    #[inline(always)]
+    pub fn pop(&mut self) -> Option<usize> {
+        let lane = (self.mask != 0).then_some(self.mask.trailing_zeros() as usize)?;
+        self.mask &= self.mask - 1;
+        Some(lane)
+    }
+}

@@ -1,0 +1,71 @@
+//! The node: boxes around up to 4x4 children of a patch's tree of pieces.
+
+use super::boxes::{CellRect, HEAD_BYTES, Head, IntegerBox, LaneHits, lane_mask, union};
+use super::{LATTICE_LIMIT, LatticeRay};
+use crate::math::Bounds;
+use crate::math::simd::Kernel;
+use glam::Vec3;
+
+/// Exact size of a node, without the words that the cache puts before it.
+pub const NODE_BYTES: usize = HEAD_BYTES;
+
+/// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `bounds` has one box in lattice units
+/// for each, u fastest; it must hold every lattice vertex of the child. `out` is [`NODE_BYTES`] long.
+#[inline]
+pub fn encode_node(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &mut [u8]) {
+    debug_assert!(children.iter().all(|n| (1..=4).contains(n)));
+    let [n_u, n_v] = children.map(usize::from);
+    assert_eq!(bounds.len(), n_u * n_v, "one box for each child");
+    let whole = bounds.iter().map(integer_box).reduce(union).expect("a node has children");
+    let mut boxes = [whole; 16];
+    for (c, b) in bounds.iter().enumerate() {
+        boxes[4 * (c / n_u) + c % n_u] = integer_box(b);
+    }
+    let head = Head::new(whole, &boxes, children, cells, 0);
+    out.copy_from_slice(bytemuck::bytes_of(&head));
+}
+
+/// The box rounded outwards to lattice points, and cut to the cube that vertices lie in.
+#[inline(always)]
+fn integer_box(b: &Bounds) -> IntegerBox {
+    let inside = |p: Vec3| p.clamp(Vec3::splat(-LATTICE_LIMIT), Vec3::splat(LATTICE_LIMIT)).as_ivec3().to_array();
+    [inside(b.min.floor()), inside(b.max.ceil())]
+}
+
+/// A node to be read.
+#[derive(Clone, Copy, Debug)]
+pub struct NodeView<'b> {
+    pub(super) head: &'b Head,
+}
+
+impl<'b> NodeView<'b> {
+    /// The node at the start of `bytes`, which must be aligned to 4 bytes at least (64 is best).
+    #[inline(always)]
+    pub fn new(bytes: &'b [u8]) -> Self {
+        Self { head: bytemuck::from_bytes(&bytes[..NODE_BYTES]) }
+    }
+
+    /// The cells that the node covers.
+    #[inline(always)]
+    pub fn cells(&self) -> CellRect {
+        self.head.cells
+    }
+
+    /// Children along u and v.
+    #[inline(always)]
+    pub fn children(&self) -> [u8; 2] {
+        self.head.lanes
+    }
+
+    /// Lanes of the children, as bits.
+    #[inline(always)]
+    pub fn lanes(&self) -> u32 {
+        lane_mask(self.head.lanes)
+    }
+
+    /// The children whose boxes the ray meets before `t_max`. Child (a, b) is lane 4 b + a.
+    #[inline(always)]
+    pub fn test<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> LaneHits {
+        self.head.test(kernel, ray, t_max)
+    }
+}

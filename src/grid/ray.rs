@@ -1,0 +1,159 @@
+//! A ray made ready for boxes and triangles of the lattice.
+
+use super::TriangleId;
+use glam::{DVec3, Vec3};
+
+/// Greatest magnitude of a lattice coordinate of a grid vertex.
+pub const LATTICE_LIMIT: f32 = 16_777_216.0;
+
+/// Rays that start outside the cube of this half-width are first moved up to it, in f64.
+const START_LIMIT: f64 = 33_554_432.0;
+
+/// A ray in lattice space.
+///
+/// The direction is scaled by a power of two, so that its largest component is in [1, 2]: `t` inside lattice space counts in units of
+/// the scaled direction, and [`Self::caller_t`] gives it in the caller's. Components below 2^-64 of the largest count as zero.
+/// *The ray* below is the one with the rounded origin and direction; boxes and triangles see the same.
+///
+/// # Why no box hides a triangle that would be hit
+/// Write u = 2^-24 and D for the largest distance, along any axis, from the origin to a point of the lattice cube; |origin| <= 2^25, and
+/// `reach` = |origin| + 2^24 >= D.
+///
+/// *Triangles.* A vertex v is sheared to v'_x = fl(fl(v_x - o_x) - fl(S_x fl(v_z - o_z))), |S_x| <= 1 (z stands for the axis of the largest component).
+/// Summing the five roundings, |v'_x - exact| <= u (2 |v_x - o_x| + 4 |v_z - o_z|) <= 6 u D. The signs of the edge functions are exact for these v'.
+/// If they report a hit, some point P of the exact triangle has, at its own depth, a distance of at most 6 u D along x and y from the ray.
+/// So the ray passes through every box around the triangle that is widened by 6 u D.
+///
+/// *Boxes.* A plane is tested as fl(fl(plane - o) * inv), or for 8-bit boxes as fl(fl(q * step_inv) + fl(fl(base - o) * inv)) with an exact
+/// `step_inv` but for the rounding of `inv` itself. The errors, as distances along the axis, are at most 3 u D in the first case; in the second at most
+/// 2 u q step + 3 u |base - o| + u |sum| <= 8 u D, for no box is wider than 2 D.
+///
+/// Both are covered by moving the near planes towards the origin and the far planes away from it by `slack` = 16 u `reach` >= 14 u D; this
+/// is done once per ray, in `near_origin` and `far_origin`, rounded outwards. In a coordinate system of 2^24 steps, slack is 48 steps at most.
+///
+/// *Zero components* have `inv` = +-2^96, by sign. Where the origin is inside a widened slab, the distance to its planes is at least 2 u `reach`, times 2^96: beyond
+/// any t; where it is outside, the entry is beyond any t likewise. No operation on finite boxes gives infinity or NaN.
+#[derive(Clone, Copy, Debug)]
+pub struct LatticeRay {
+    /// Origin, in lattice units; |coordinate| <= 2^25.
+    pub(crate) origin: [f32; 3],
+    /// Origin moved along the direction's sign by the slack: near planes are measured from it.
+    pub(crate) near_origin: [f32; 3],
+    /// Origin moved against the direction's sign: far planes are measured from it.
+    pub(crate) far_origin: [f32; 3],
+    /// 1 / direction, finite.
+    pub(crate) inv: [f32; 3],
+    /// 1 where the direction is negative, or -0.
+    pub(crate) is_negative: [usize; 3],
+    /// Axes (x, y, z of the sheared space): z is that of the largest component; x and y are swapped if that is negative, which keeps the winding.
+    pub(crate) axes: [usize; 3],
+    /// Woop's shear: d_x/d_z, d_y/d_z, 1/d_z.
+    pub(crate) shear: [f32; 3],
+    /// Hits beyond are ignored. Negative for a ray that hits nothing.
+    pub(crate) t_max: f32,
+    /// This triangle is not hit.
+    pub(crate) skip: TriangleId,
+    t_start: f64,
+    t_unit: f64,
+}
+
+impl LatticeRay {
+    /// The ray from `origin` along `direction`, both in lattice space; `t_max` in units of `direction`. The triangle `skip` is not hit
+    /// ([`TriangleId::NONE`]: every triangle can be).
+    ///
+    /// The direction may have any length. If it is zero, or anything is not finite (but for `t_max`), the ray hits nothing.
+    pub fn new(origin: DVec3, direction: DVec3, t_max: f32, skip: TriangleId) -> Self {
+        let largest = direction.abs().max_element();
+        let is_valid = largest > 0.0 && direction.is_finite() && origin.is_finite() && t_max >= 0.0;
+        let (origin, direction, largest) =
+            if is_valid { (origin, direction, largest) } else { (DVec3::ZERO, DVec3::X, 1.0) };
+        let t_unit = power_of_two_below(largest).recip();
+        let scaled = direction * t_unit;
+        let t_start = if is_valid { start(origin, scaled) } else { None };
+        let t_end = t_start.map_or(-1.0, |t_start| (f64::from(t_max) / t_unit - t_start) as f32);
+        let t_start = t_start.unwrap_or(0.0);
+        Self::from_start((origin + t_start * scaled).as_vec3(), scaled, t_end, skip, t_start, t_unit)
+    }
+
+    fn from_start(origin: Vec3, scaled: DVec3, t_max: f32, skip: TriangleId, t_start: f64, t_unit: f64) -> Self {
+        let direction = scaled.to_array().map(without_dust);
+        let slack = (origin.abs().max_element() + LATTICE_LIMIT) * f32::powi(2.0, -20);
+        let origin = origin.to_array();
+        let is_negative = direction.map(|d| usize::from(d.is_sign_negative()));
+        let forward = direction.map(|d| slack.copysign(d));
+        let axes = shear_axes(direction);
+        let [dx, dy, dz] = axes.map(|k| direction[k]);
+        Self {
+            origin,
+            near_origin: std::array::from_fn(|k| moved(origin[k], forward[k])),
+            far_origin: std::array::from_fn(|k| moved(origin[k], -forward[k])),
+            inv: direction.map(|d| if d == 0.0 { f32::powi(2.0, 96).copysign(d) } else { 1.0 / d }),
+            is_negative,
+            axes,
+            shear: [dx / dz, dy / dz, 1.0 / dz],
+            t_max,
+            skip,
+            t_start,
+            t_unit,
+        }
+    }
+
+    /// A ray parameter of lattice space in units of the direction that [`Self::new`] was given. Monotone, finite for finite `t`.
+    #[inline]
+    pub fn caller_t(&self, t: f32) -> f32 {
+        let t = (f64::from(t) + self.t_start) * self.t_unit;
+        if t.is_finite() { t.min(f64::from(f32::MAX)) as f32 } else { f32::INFINITY }
+    }
+
+    /// Where the ray ends, in lattice space's units of t; negative for a ray that hits nothing.
+    #[inline(always)]
+    pub fn t_max(&self) -> f32 {
+        self.t_max
+    }
+}
+
+/// The power of two p with p <= x < 2p, for a positive normal x; the smallest normal number for a subnormal one.
+fn power_of_two_below(x: f64) -> f64 {
+    f64::from_bits(x.to_bits() & 0x7ff0_0000_0000_0000).max(f64::MIN_POSITIVE)
+}
+
+/// `x` + `step`, rounded away from `x`.
+fn moved(x: f32, step: f32) -> f32 {
+    if step > 0.0 { (x + step).next_up() } else { (x + step).next_down() }
+}
+
+/// Rounded to f32, with the sign of the zero kept, and zero below 2^-64.
+fn without_dust(d: f64) -> f32 {
+    if d.abs() < f64::powi(2.0, -64) { 0.0f32.copysign(d as f32) } else { d as f32 }
+}
+
+/// Where along the ray to start: 0 from within the start cube, else where it enters; `None` if it does not.
+fn start(origin: DVec3, direction: DVec3) -> Option<f64> {
+    if origin.abs().max_element() <= START_LIMIT {
+        return Some(0.0);
+    }
+    let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+    for (o, d) in origin.to_array().into_iter().zip(direction.to_array()) {
+        if d == 0.0 && o.abs() > START_LIMIT {
+            return None;
+        } else if d != 0.0 {
+            enter = enter.max((-START_LIMIT.copysign(d) - o) / d);
+            leave = leave.min((START_LIMIT.copysign(d) - o) / d);
+        }
+    }
+    (enter <= leave).then_some(enter)
+}
+
+/// The axes x, y, z of the sheared space for a direction.
+fn shear_axes(direction: [f32; 3]) -> [usize; 3] {
+    let [x, y, z] = direction.map(f32::abs);
+    let axis = if x >= y && x >= z {
+        0
+    } else if y >= z {
+        1
+    } else {
+        2
+    };
+    let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
+    if direction[axis] < 0.0 { [last, next, axis] } else { [next, last, axis] }
+}

@@ -1,0 +1,135 @@
+//! The kernel of AVX2 registers.
+#![allow(unsafe_code)]
+
+use super::{Kernel, Task};
+use std::arch::x86_64::*;
+
+/// Eight lanes in one register. A value of this type proves that the processor has AVX2 (and the small extensions that came with it).
+#[derive(Clone, Copy, Debug)]
+pub struct Avx2(());
+
+impl Avx2 {
+    /// The kernel, if this processor can run it.
+    #[inline]
+    pub fn detect() -> Option<Self> {
+        let here = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt");
+        here.then_some(Avx2(()))
+    }
+
+    /// Does `task` in a function compiled for this kernel's instructions.
+    #[inline]
+    pub fn run<T: Task>(self, task: T) -> T::Output {
+        // SAFETY: `self` exists, so `detect` found every feature that `enter` is compiled for.
+        unsafe { enter(self, task) }
+    }
+}
+
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+fn enter<T: Task>(kernel: Avx2, task: T) -> T::Output {
+    task.run(kernel)
+}
+
+/// One intrinsic that reads and writes no memory.
+macro_rules! in_registers {
+    ($intrinsic:expr) => {{
+        // SAFETY: `self` exists, so the processor has AVX2 (invariant 2 of the module), and no memory is touched.
+        unsafe { $intrinsic }
+    }};
+}
+
+impl Kernel for Avx2 {
+    type F = __m256;
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> __m256 {
+        in_registers!(_mm256_set1_ps(x))
+    }
+    #[inline(always)]
+    fn load(self, x: &[f32; 8]) -> __m256 {
+        // SAFETY: `self` proves AVX2; `x` is 32 readable bytes and the load needs no alignment.
+        unsafe { _mm256_loadu_ps(x.as_ptr()) }
+    }
+    #[inline(always)]
+    fn store(self, x: __m256) -> [f32; 8] {
+        let mut out = [0.0; 8];
+        // SAFETY: `self` proves AVX2; `out` is 32 writable bytes and the store needs no alignment.
+        unsafe { _mm256_storeu_ps(out.as_mut_ptr(), x) };
+        out
+    }
+    #[inline(always)]
+    fn widen(self, x: &[u8; 8]) -> __m256 {
+        // SAFETY: `self` proves AVX2; `x` is the 8 readable bytes that are loaded.
+        unsafe { _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(x.as_ptr().cast()))) }
+    }
+    #[inline(always)]
+    fn add(self, a: __m256, b: __m256) -> __m256 {
+        in_registers!(_mm256_add_ps(a, b))
+    }
+    #[inline(always)]
+    fn sub(self, a: __m256, b: __m256) -> __m256 {
+        in_registers!(_mm256_sub_ps(a, b))
+    }
+    #[inline(always)]
+    fn mul(self, a: __m256, b: __m256) -> __m256 {
+        in_registers!(_mm256_mul_ps(a, b))
+    }
+    #[inline(always)]
+    fn div(self, a: __m256, b: __m256) -> __m256 {
+        in_registers!(_mm256_div_ps(a, b))
+    }
+    #[inline(always)]
+    fn min(self, a: __m256, b: __m256) -> __m256 {
+        in_registers!(_mm256_min_ps(a, b))
+    }
+    #[inline(always)]
+    fn max(self, a: __m256, b: __m256) -> __m256 {
+        in_registers!(_mm256_max_ps(a, b))
+    }
+    #[inline(always)]
+    fn le(self, a: __m256, b: __m256) -> u32 {
+        in_registers!(_mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32)
+    }
+    #[inline(always)]
+    fn eq(self, a: __m256, b: __m256) -> u32 {
+        in_registers!(_mm256_movemask_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(a, b)) as u32)
+    }
+    #[inline(always)]
+    fn pick_0112(self, a: __m256, b: __m256) -> __m256 {
+        in_registers!(_mm256_shuffle_ps::<0b10_01_01_00>(a, b))
+    }
+    #[inline(always)]
+    fn pick_1201(self, a: __m256, b: __m256) -> __m256 {
+        in_registers!(_mm256_shuffle_ps::<0b01_00_10_01>(a, b))
+    }
+    #[inline(always)]
+    unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> __m256 {
+        debug_assert!(at.iter().all(|at| at + if BYTES == 2 { 8 } else { 16 } <= bytes.len()));
+        // SAFETY: `self` proves AVX2; the caller promises that the 8 (for BYTES = 2) or 16 bytes from both places are inside `bytes`.
+        unsafe {
+            let low = bytes.as_ptr().add(at[0]).cast();
+            let high = bytes.as_ptr().add(at[1]).cast();
+            let integers = match BYTES {
+                2 => _mm256_cvtepu16_epi32(_mm_unpacklo_epi64(_mm_loadl_epi64(low), _mm_loadl_epi64(high))),
+                3 => _mm256_shuffle_epi8(_mm256_loadu2_m128i(high, low), three_byte_integers()),
+                _ => _mm256_loadu2_m128i(high, low),
+            };
+            _mm256_cvtepi32_ps(_mm256_add_epi32(integers, _mm256_set1_epi32(base)))
+        }
+    }
+    #[inline(always)]
+    fn prefetch<T>(self, x: *const T) {
+        // SAFETY: a prefetch is a hint that cannot fault, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(x.cast()) }
+    }
+}
+
+/// The byte shuffle that spreads packed three-byte integers into lanes of four.
+#[inline(always)]
+unsafe fn three_byte_integers() -> __m256i {
+    // SAFETY: the caller has AVX2; no memory is touched.
+    unsafe { _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 2, -1, 3, 4, 5, -1, 6, 7, 8, -1, 9, 10, 11, -1)) }
+}

@@ -1,0 +1,102 @@
+//! Eight floats at a time, the same bits on every processor.
+//!
+//! A **kernel** is a set of operations on eight lanes. [`Portable`] does them on arrays and works everywhere; [`Avx2`] does
+//! them in registers. Traversal and intersection are written once, generic over [`Kernel`], and marked
+//! `#[inline(always)]`. A [`Task`] is such code with its arguments; [`run`] picks the kernel and enters it through one function
+//! compiled for that kernel's instructions, so that everything inlined into it uses them. Call [`run`] once per batch
+//! of rays or once per ray, never per node.
+//!
+//! # Invariants
+//! 1. Both kernels give the same bits: an operation is one IEEE operation, correctly rounded; none is fused. A fused
+//!    multiply-add would also break the watertightness of triangles, whose edge functions must be exact negatives of each other.
+//! 2. An `Avx2` value exists only where the processor has AVX2: it is the witness that every `unsafe` block there leans on.
+
+#![allow(unsafe_code)]
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod portable;
+
+#[cfg(target_arch = "x86_64")]
+pub use avx2::Avx2;
+pub use portable::Portable;
+
+/// The operations on eight lanes that boxes and triangles are tested with.
+pub trait Kernel: Copy + Send + Sync + 'static {
+    /// Eight floats.
+    type F: Copy;
+
+    /// `x` in every lane.
+    fn splat(self, x: f32) -> Self::F;
+    /// The eight floats at `x`.
+    fn load(self, x: &[f32; 8]) -> Self::F;
+    /// The lanes as an array.
+    fn store(self, x: Self::F) -> [f32; 8];
+    /// Eight bytes as floats 0 to 255.
+    fn widen(self, x: &[u8; 8]) -> Self::F;
+    /// Lanewise sum.
+    fn add(self, a: Self::F, b: Self::F) -> Self::F;
+    /// Lanewise difference.
+    fn sub(self, a: Self::F, b: Self::F) -> Self::F;
+    /// Lanewise product.
+    fn mul(self, a: Self::F, b: Self::F) -> Self::F;
+    /// Lanewise quotient.
+    fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    /// Lanewise `if a < b { a } else { b }`.
+    fn min(self, a: Self::F, b: Self::F) -> Self::F;
+    /// Lanewise `if a > b { a } else { b }`.
+    fn max(self, a: Self::F, b: Self::F) -> Self::F;
+    /// Bit k is set where `a <= b` in lane k.
+    fn le(self, a: Self::F, b: Self::F) -> u32;
+    /// Bit k is set where `a == b` in lane k.
+    fn eq(self, a: Self::F, b: Self::F) -> u32;
+    /// In each half of four lanes, `[a0, a1, b1, b2]`.
+    fn pick_0112(self, a: Self::F, b: Self::F) -> Self::F;
+    /// In each half of four lanes, `[a1, a2, b0, b1]`.
+    fn pick_1201(self, a: Self::F, b: Self::F) -> Self::F;
+
+    /// Two runs of four little-endian unsigned integers of `BYTES` bytes each (2, 3 or 4), at `at[0]` and `at[1]`; `base` is added to each
+    /// (wrapping) and the sums are converted to floats.
+    ///
+    /// # Safety
+    /// `at[k] + 16 <= bytes.len()` for both k; for `BYTES` = 2, `at[k] + 8 <= bytes.len()` is enough.
+    unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> Self::F;
+
+    /// Asks for the cache line of `x`, which may be any address.
+    fn prefetch<T>(self, x: *const T);
+}
+
+/// Work that is compiled once for every kernel. Mark `run` `#[inline(always)]`.
+pub trait Task {
+    /// What the work gives.
+    type Output;
+    /// Does the work.
+    fn run<K: Kernel>(self, kernel: K) -> Self::Output;
+}
+
+/// Does `task` with the best kernel that this processor has.
+///
+/// ```
+/// use lazytess::math::simd::{Kernel, Task, run};
+///
+/// struct Sum([f32; 8]);
+/// impl Task for Sum {
+///     type Output = f32;
+///     #[inline(always)]
+///     fn run<K: Kernel>(self, k: K) -> f32 {
+///         k.store(k.load(&self.0)).iter().sum()
+///     }
+/// }
+/// assert_eq!(run(Sum([1.0; 8])), 8.0);
+/// ```
+#[inline]
+pub fn run<T: Task>(task: T) -> T::Output {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(kernel) = Avx2::detect() {
+        return kernel.run(task);
+    }
+    task.run(Portable)
+}
+
+#[cfg(test)]
+mod tests;

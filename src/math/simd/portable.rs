@@ -1,0 +1,92 @@
+//! The kernel of arrays: what every operation means, and what runs where there is no AVX2.
+
+#![allow(unsafe_code)]
+
+use super::Kernel;
+use std::array::from_fn;
+
+/// Eight lanes as an array of floats.
+#[derive(Clone, Copy, Debug)]
+pub struct Portable;
+
+#[inline(always)]
+fn zip(a: [f32; 8], b: [f32; 8], op: impl Fn(f32, f32) -> f32) -> [f32; 8] {
+    from_fn(|k| op(a[k], b[k]))
+}
+
+#[inline(always)]
+fn mask(a: [f32; 8], b: [f32; 8], holds: impl Fn(f32, f32) -> bool) -> u32 {
+    (0..8).fold(0, |m, k| m | (u32::from(holds(a[k], b[k])) << k))
+}
+
+impl Kernel for Portable {
+    type F = [f32; 8];
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> [f32; 8] {
+        [x; 8]
+    }
+    #[inline(always)]
+    fn load(self, x: &[f32; 8]) -> [f32; 8] {
+        *x
+    }
+    #[inline(always)]
+    fn store(self, x: [f32; 8]) -> [f32; 8] {
+        x
+    }
+    #[inline(always)]
+    fn widen(self, x: &[u8; 8]) -> [f32; 8] {
+        x.map(f32::from)
+    }
+    #[inline(always)]
+    fn add(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn min(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn le(self, a: [f32; 8], b: [f32; 8]) -> u32 {
+        mask(a, b, |a, b| a <= b)
+    }
+    #[inline(always)]
+    fn eq(self, a: [f32; 8], b: [f32; 8]) -> u32 {
+        mask(a, b, |a, b| a == b)
+    }
+    #[inline(always)]
+    fn pick_0112(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        [a[0], a[1], b[1], b[2], a[4], a[5], b[5], b[6]]
+    }
+    #[inline(always)]
+    fn pick_1201(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        [a[1], a[2], b[0], b[1], a[5], a[6], b[4], b[5]]
+    }
+    #[inline(always)]
+    unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> [f32; 8] {
+        from_fn(|k| {
+            let at = at[k / 4] + BYTES * (k % 4);
+            let mut word = [0; 4];
+            word[..BYTES].copy_from_slice(&bytes[at..at + BYTES]);
+            u32::from_le_bytes(word).wrapping_add_signed(base) as i32 as f32
+        })
+    }
+    #[inline(always)]
+    fn prefetch<T>(self, _: *const T) {}
+}

@@ -1,0 +1,53 @@
+//! Every operation of every kernel gives the bits of the portable one.
+#![allow(unsafe_code)]
+
+use super::*;
+
+/// Numbers that are ordinary, tiny, huge, zero of both signs, infinite and not numbers.
+fn awkward(seed: u32) -> [f32; 8] {
+    let table = [0.0, -0.0, 1.0, -3.5, 1e-40, 1e30, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 16777216.0, 7.25e-9];
+    std::array::from_fn(|k| table[(seed as usize * 7 + k * k + k * (seed as usize / 11)) % table.len()])
+}
+
+/// All results of one round of operations, as bits.
+struct Round(u32);
+
+impl Task for Round {
+    type Output = Vec<u32>;
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> Vec<u32> {
+        let (a, b) = (k.load(&awkward(self.0)), k.load(&awkward(self.0 / 3 + 5)));
+        let bytes: [u8; 64] = std::array::from_fn(|i| (i as u32 * 37 + self.0 * 11) as u8);
+        let eight = std::array::from_fn(|i| bytes[i]);
+        // SAFETY: the last place is 48, and 16 bytes from there are inside `bytes`.
+        let integers = unsafe {
+            [
+                k.integers::<2>(&bytes, [0, 48], -70000),
+                k.integers::<3>(&bytes, [5, 48], -8_388_608),
+                k.integers::<4>(&bytes, [16, 31], 12345),
+            ]
+        };
+        let floats = [
+            k.add(a, b),
+            k.sub(a, b),
+            k.mul(a, b),
+            k.div(a, b),
+            k.min(a, b),
+            k.max(a, b),
+            k.pick_0112(a, b),
+            k.pick_1201(a, b),
+            k.splat(self.0 as f32),
+            k.widen(&eight),
+        ];
+        let canonical = |x: f32| if x.is_nan() { f32::NAN.to_bits() } else { x.to_bits() };
+        let lanes = floats.into_iter().chain(integers).flat_map(|f| k.store(f).map(canonical));
+        lanes.chain([k.le(a, b), k.eq(a, b)]).collect()
+    }
+}
+
+#[test]
+fn the_detected_kernel_gives_the_bits_of_the_portable_one() {
+    for seed in 0..2000 {
+        assert_eq!(run(Round(seed)), Round(seed).run(Portable), "seed {seed}");
+    }
+}

@@ -1,0 +1,104 @@
+//! The top level: a tree over the boxes of a mesh's patches, in lattice space.
+//!
+//! obvhs builds a binary tree; `collapse.rs` turns it into a **wide tree** whose **nodes** have up to eight **lanes**. A lane is empty, an
+//! inner node or a **leaf**: one patch. A leaf is named by its **leaf slot**, `8 * node + lane`; the cache's table of slots is indexed by it, so
+//! its address is known as soon as the leaf is put on the stack, and can be fetched ahead.
+//!
+//! ```text
+//!   node, 224 bytes                      stack entry, 64 bits, ordered by t
+//!   ┌───────────────────────┬─────────┐  ┌──────────────┬─┬──────────────────────┐
+//!   │ x, y, z low, x, y, z  │ 8 refs  │  │ t of entry   │L│ node, or leaf slot   │
+//!   │ high: 6 x 8 floats    │ 32 bits │  └──────────────┴─┴──────────────────────┘
+//!   └───────────────────────┴─────────┘
+//! ```
+//!
+//! # Invariants
+//! 1. A lane's box holds every box below it.
+//! 2. The test of a box is conservative against the triangle test ([`LatticeRay`](crate::grid::LatticeRay) has the argument), so a patch that a ray hits is visited.
+//! 3. Leaves are visited in the order of their entry; those entered at exactly `t_max` are visited too, so that ties are seen.
+//!
+//! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Ylitie, Karras, Laine 2017 (collapse), Ize 2013 and Woop et al. 2013 (slabs). Read `traverse.rs` first.
+
+mod build;
+mod collapse;
+mod traverse;
+
+use crate::ids::PatchId;
+
+pub use build::BUILD_BYTES_PER_PATCH;
+pub use traverse::TraversalStack;
+
+/// A leaf of the tree.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct LeafRef {
+    /// Index into the cache's table of slots, below [`TopLevel::n_slots`].
+    pub slot: u32,
+    /// The patch, as its index in the boxes that the tree was built over.
+    pub patch: PatchId,
+}
+
+/// Lanes of a node.
+const LANES: usize = 8;
+
+/// Marks a leaf: in a node's refs with a patch, in a stack entry with a slot.
+const LEAF: u32 = 1 << 31;
+
+/// The ref of an empty lane.
+const EMPTY: u32 = u32::MAX;
+
+/// Up to eight boxes and what is in them.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+struct WideNode {
+    /// Low planes of x, y, z, then high planes. An empty lane has its low planes above its high ones.
+    planes: [[f32; LANES]; 6],
+    /// `LEAF | patch`, or an inner node, or `EMPTY`.
+    refs: [u32; LANES],
+}
+
+const _: () = assert!(size_of::<WideNode>() == 224);
+
+/// The tree over a mesh's patches.
+///
+/// ```
+/// use glam::{DVec3, Vec3};
+/// use lazytess::grid::{LatticeRay, TriangleId};
+/// use lazytess::math::{Bounds, simd::Portable};
+/// use lazytess::scene::accel::{TopLevel, TraversalStack};
+///
+/// let boxes: Vec<Bounds> = (0..100).map(|x| 1000.0 * Vec3::X * x as f32).map(|p| Bounds { min: p, max: p + 100.0 }).collect();
+/// let tree = TopLevel::build(&boxes);
+/// let ray = LatticeRay::new(DVec3::new(-50.0, 50.0, 50.0), DVec3::X, f32::INFINITY, TriangleId::NONE);
+/// let mut order = vec![];
+/// tree.closest(Portable, &ray, &mut TraversalStack::default(), |_slot| {}, |leaf, _t_max| order.push(leaf.patch.idx()));
+/// assert_eq!(order, (0..100).collect::<Vec<_>>());
+/// ```
+#[derive(Clone, Debug)]
+pub struct TopLevel {
+    nodes: Vec<WideNode>,
+    /// Entries that a traversal can have on its stack at once.
+    stack_need: usize,
+}
+
+impl TopLevel {
+    /// Size of the table that [`LeafRef::slot`] indexes: eight for every node.
+    pub fn n_slots(&self) -> usize {
+        LANES * self.nodes.len()
+    }
+
+    /// Resident size.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+    }
+
+    /// All leaves, in the order of their slots.
+    pub fn leaves(&self) -> impl Iterator<Item = LeafRef> + '_ {
+        let refs = self.nodes.iter().flat_map(|n| n.refs);
+        refs.enumerate()
+            .filter(|(_, r)| *r != EMPTY && r & LEAF != 0)
+            .map(|(slot, r)| LeafRef { slot: slot as u32, patch: PatchId(r & !LEAF) })
+    }
+}
+
+#[cfg(test)]
+mod tests;

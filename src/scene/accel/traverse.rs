@@ -1,0 +1,158 @@
+//! Rays through the wide tree.
+
+use super::{LANES, LEAF, LeafRef, TopLevel, WideNode};
+use crate::grid::LatticeRay;
+use crate::ids::PatchId;
+use crate::math::simd::Kernel;
+
+/// The stack of a traversal, kept by each thread so that no ray allocates.
+#[derive(Clone, Debug, Default)]
+pub struct TraversalStack {
+    entries: Vec<Entry>,
+}
+
+/// Something to visit: bits of the t of entry above, `LEAF | slot` or an inner node below. t >= 0, so entries are ordered by t.
+type Entry = u64;
+
+#[inline(always)]
+fn entry(t: f32, target: u32) -> Entry {
+    u64::from(t.to_bits()) << 32 | u64::from(target)
+}
+
+#[inline(always)]
+fn t_of(entry: Entry) -> f32 {
+    f32::from_bits((entry >> 32) as u32)
+}
+
+impl TopLevel {
+    /// Calls `visit` for the patches whose boxes the ray meets, nearest first, until the rest lie beyond `t_max`. It is given as [`LatticeRay::t_max`]
+    /// and `visit` makes it smaller when it hits something. `prefetch` is called with a leaf's slot when the leaf is found, some time before its visit.
+    #[inline(always)]
+    pub fn closest<K: Kernel>(
+        &self,
+        kernel: K,
+        ray: &LatticeRay,
+        stack: &mut TraversalStack,
+        prefetch: impl Fn(u32),
+        mut visit: impl FnMut(LeafRef, &mut f32),
+    ) {
+        let mut t_max = ray.t_max;
+        let stack = stack.empty(self.stack_need);
+        let mut next = Some(entry(0.0, 0));
+        while let Some(current) = next {
+            let target = current as u32;
+            if t_of(current) > t_max {
+                next = stack.pop();
+            } else if target & LEAF != 0 {
+                visit(self.leaf(target), &mut t_max);
+                next = stack.pop();
+            } else {
+                let first = stack.len();
+                self.push_children(kernel, ray, t_max, target, stack, &prefetch);
+                sort_descending(&mut stack[first..]);
+                next = stack.pop();
+            }
+        }
+    }
+
+    /// Calls `visit` for the patches whose boxes the ray meets, in any order, until it says `true`: then so does this.
+    #[inline(always)]
+    pub fn occluded<K: Kernel>(
+        &self,
+        kernel: K,
+        ray: &LatticeRay,
+        stack: &mut TraversalStack,
+        prefetch: impl Fn(u32),
+        mut visit: impl FnMut(LeafRef) -> bool,
+    ) -> bool {
+        let stack = stack.empty(self.stack_need);
+        stack.push(entry(0.0, 0));
+        while let Some(current) = stack.pop() {
+            let target = current as u32;
+            if target & LEAF == 0 {
+                self.push_children(kernel, ray, ray.t_max, target, stack, &prefetch);
+            } else if visit(self.leaf(target)) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Pushes the lanes of `node` that the ray meets.
+    #[inline(always)]
+    fn push_children<K: Kernel>(
+        &self,
+        k: K,
+        ray: &LatticeRay,
+        t_max: f32,
+        node: u32,
+        stack: &mut Vec<Entry>,
+        prefetch: &impl Fn(u32),
+    ) {
+        let wide = &self.nodes[node as usize];
+        let (mut mask, t_near) = wide.test(k, ray, t_max);
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            let target = if wide.refs[lane] & LEAF != 0 {
+                let slot = node * LANES as u32 + lane as u32;
+                prefetch(slot);
+                LEAF | slot
+            } else {
+                let inner = wide.refs[lane];
+                let lines: *const [u8; 64] = (&raw const self.nodes[inner as usize]).cast();
+                (0..4).for_each(|line| k.prefetch(lines.wrapping_add(line)));
+                inner
+            };
+            stack.push(entry(t_near[lane], target));
+        }
+    }
+
+    #[inline(always)]
+    fn leaf(&self, target: u32) -> LeafRef {
+        let slot = target & !LEAF;
+        let reference = self.nodes[slot as usize / LANES].refs[slot as usize % LANES];
+        LeafRef { slot, patch: PatchId(reference & !LEAF) }
+    }
+}
+
+impl WideNode {
+    /// The lanes that the ray meets between 0 and `t_max`, and where it enters them.
+    #[inline(always)]
+    fn test<K: Kernel>(&self, k: K, ray: &LatticeRay, t_max: f32) -> (u32, [f32; LANES]) {
+        let (mut enter, mut leave) = (k.splat(0.0), k.splat(t_max));
+        for axis in 0..3 {
+            let inv = k.splat(ray.inv[axis]);
+            let t = |plane: usize, origin: f32| k.mul(k.sub(k.load(&self.planes[plane]), k.splat(origin)), inv);
+            let near = axis + 3 * ray.is_negative[axis];
+            let far = axis + 3 * (1 - ray.is_negative[axis]);
+            enter = k.max(t(near, ray.near_origin[axis]), enter);
+            leave = k.min(t(far, ray.far_origin[axis]), leave);
+        }
+        (k.le(enter, leave), k.store(enter))
+    }
+}
+
+impl TraversalStack {
+    /// The stack, empty, with room for `need` entries.
+    #[inline(always)]
+    fn empty(&mut self, need: usize) -> &mut Vec<Entry> {
+        self.entries.clear();
+        self.entries.reserve(need);
+        &mut self.entries
+    }
+}
+
+/// Insertion sort, greatest first: lists have eight entries at most, and one or two as a rule.
+#[inline(always)]
+fn sort_descending(entries: &mut [Entry]) {
+    for i in 1..entries.len() {
+        let moving = entries[i];
+        let mut hole = i;
+        while hole > 0 && entries[hole - 1] < moving {
+            entries[hole] = entries[hole - 1];
+            hole -= 1;
+        }
+        entries[hole] = moving;
+    }
+}
