@@ -4,6 +4,7 @@
 //! that case alone by setting the loop to it.
 
 use lazytess::io::obj::parse_obj;
+use lazytess::io::scene_file::parse_scene;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -16,6 +17,20 @@ const OBJ_SEEDS: [&str; 3] = [
     "v 0 0 0\r\nv 1 0 0\r\nv 1 1 0\r\nv 0 1 0\r\nf 1 2 3 4\r\n# caf\u{e9}\r\n\
      t vertexedit 8/8/6 3 0 1 2 3 0 3 0 0 0 1 10 1 0 0 5 add P value set P sharpness\r\n\
      t edgeedit 4/1/3 3 0 1 2 2 add P sharpness\r\nt faceedit 3/0/1 2 0 1 hole\r\n",
+];
+
+/// Scenes that use every key.
+const SCENE_SEEDS: [&str; 2] = [
+    "background = 0.5\n[camera]\neye = [0, 1, 5]\nat = [0, 0, 0]\nup = [0, 1, 0]\nfov = 40\n[render]\nsize = [64, 48]\n\
+     spp = 4\nintegrator = \"ao\"\nrate = \"px:1\"\nmax_depth = 3\nao_samples = 8\n[materials.a]\n\
+     checker = { even = 0.1, odd = \"#ff8800\", size = 2.5 }\nspecular = [0, 0.5, 1]\nshininess = 10\nmirror = 0.1\n\
+     [[mesh]]\nfile = \"a.obj\"\nmaterial = \"a\"\nrate = \"fixed:4\"\n\
+     transform = { scale = [1, 2, 3], rotate = [10, 20, 30], translate = [1, 1, 1] }\n",
+    "[materials.g]\ndiffuse = 0.2\nglass = { ior = 1.5, transmit = 1 }\n[[mesh]]\nfile = \"b.obj\"\nmaterial = \"g\"\n\
+     transform = { rotate = { axis = [0, 1, 0], degrees = 45 }, scale = 2 }\n[[mesh]]\nfile = \"c.obj\"\n\
+     transform = { matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] }\n\
+     [[light]]\nkind = \"point\"\nposition = [1, 2, 3]\nintensity = 4\n[[light]]\nkind = \"sky\"\nradiance = 0.5\n\
+     [[light]]\nkind = \"directional\"\ndirection = [0, -1, 0]\nirradiance = 3\n",
 ];
 
 /// What mutations like to insert.
@@ -87,6 +102,18 @@ fn mutated_obj_never_panics_and_errors_are_sentences() {
     fuzz(&OBJ_SEEDS, 200_000, |text| match parse_obj(text, path) {
         Ok(obj) => obj.mesh.validate().expect("what the reader lets through is valid"),
         Err(e) => assert!(e.to_string().contains("fuzz.obj"), "{e}"),
+    });
+}
+
+#[test]
+fn mutated_scene_never_panics_and_errors_are_sentences() {
+    let path = Path::new("fuzz.toml");
+    fuzz(&SCENE_SEEDS, 20_000, |text| {
+        let text = String::from_utf8_lossy(text);
+        match parse_scene(&text, path) {
+            Ok(scene) => assert!(scene.meshes.iter().all(|m| m.world_from_object.inverse().is_finite()), "{text}"),
+            Err(e) => assert!(e.to_string().starts_with("fuzz.toml:"), "{e}"),
+        }
     });
 }
 

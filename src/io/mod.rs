@@ -11,4 +11,5 @@ pub mod exr;
 pub mod obj;
 pub mod picture;
 pub mod png;
+pub mod scene_file;
 pub mod write;

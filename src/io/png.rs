@@ -73,7 +73,7 @@ fn decode_pixel(bytes: &[u8], n_samples: usize, sample_bytes: usize) -> [f32; 3]
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) from display to linear.
-fn linear_from_srgb(value: f32) -> f32 {
+pub(super) fn linear_from_srgb(value: f32) -> f32 {
     if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 

@@ -174,6 +174,30 @@ pub enum Light {
     },
 }
 
+impl CameraDescription {
+    /// Vertical field of view in degrees of cameras that state none.
+    pub const DEFAULT_FOV: f64 = 35.0;
+
+    /// Checks what the fields promise; the message says what to change.
+    pub fn validate(&self) -> Result<(), String> {
+        let Self { eye, at, up, fov } = *self;
+        if !(eye.is_finite() && at.is_finite() && up.is_finite()) {
+            return Err("the camera has a coordinate that is not a finite number".to_owned());
+        }
+        if !(fov > 0.0 && fov < 180.0) {
+            return Err(format!("the field of view is {fov} degrees: write a value between 0 and 180"));
+        }
+        let Some(forward) = (at - eye).try_normalize() else {
+            return Err("the camera's eye and at are the same point: move one".to_owned());
+        };
+        let sideways = up.try_normalize().map_or(0.0, |up| forward.cross(up).length());
+        if sideways < 1e-9 {
+            return Err("the camera looks along its up direction: choose another up".to_owned());
+        }
+        Ok(())
+    }
+}
+
 impl SceneDescription {
     /// The scene of a bare mesh: default camera, a key light with a weak sky, a neutral material.
     pub fn bare(mesh_file: PathBuf) -> Self {
