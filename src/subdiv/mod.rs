@@ -28,6 +28,7 @@ pub mod dice;
 pub mod eval;
 pub mod local;
 pub mod plan;
+pub mod refine;
 pub mod regular;
 pub mod rules;
 pub mod surface;
