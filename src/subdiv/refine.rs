@@ -16,8 +16,8 @@
 //! let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
 //! let cube = ControlMesh::from_polygons((0..8).map(corner).collect(), &sides.map(|f| f.to_vec()))?;
 //!
-//! let middle = RefinedMesh::from_control(&cube).limit_at(FaceId(0), 0, 0.5, 0.5).unwrap();
-//! assert!(middle.position.distance(DVec3::new(0.5, 0.5, 0.1605)) < 1e-4);
+//! let middle_of_bottom = RefinedMesh::from_control(&cube).limit_at(FaceId(0), 0, 0.5, 0.5).unwrap();
+//! assert!(middle_of_bottom.position.distance(DVec3::new(0.5, 0.5, 13.0 / 162.0)) < 1e-15);
 //! # Ok::<(), lazytess::Error>(())
 //! ```
 //!
@@ -59,9 +59,9 @@ pub struct Place {
     /// Halvings of the patch so far.
     pub level: u32,
     /// Cell in u, below 2^level.
-    pub i: u32,
+    pub i: u64,
     /// Cell in v, below 2^level.
-    pub j: u32,
+    pub j: u64,
 }
 
 #[derive(Clone, Copy)]

@@ -52,8 +52,9 @@ impl RefinedMesh<'_> {
 
     /// The limit of the refined positions, where no mask is exact: refines the star until the vertex stands still.
     fn iterated_limit(&self, face: usize, k: usize) -> DVec3 {
-        // The slowest mode halves with each step, or nearly: after 80 steps it is below the last bit.
-        let mesh = (0..80).fold(self.at_corner(face, k), |mesh, _| mesh.refine().at_corner(k, k));
+        // What moves the vertex at least halves with each step, so at level 62, the last that a place can number, the
+        // rest is below the last bit.
+        let mesh = (self.place(face).level..62).fold(self.at_corner(face, k), |mesh, _| mesh.refine().at_corner(k, k));
         mesh.position(mesh.corners(0)[k].vertex as usize)
     }
 }

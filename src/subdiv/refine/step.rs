@@ -138,10 +138,10 @@ impl<'a> RefinedMesh<'a> {
 
     fn beside_edges(&self, face_points: &[DVec3]) -> Vec<Beside> {
         let mut beside = vec![Beside::default(); self.edges.len()];
-        for f in 0..self.faces.len() {
+        for (f, &point) in face_points.iter().enumerate() {
             for corner in self.corners(f) {
                 let b = &mut beside[corner.edge as usize];
-                b.face_points += face_points[f];
+                b.face_points += point;
                 b.n_faces += 1;
                 b.n_triangles += u32::from(self.faces[f].n_corners == 3);
             }
