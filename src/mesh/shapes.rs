@@ -9,7 +9,10 @@
 //! give the same mesh on every machine: random choices come from hashes, and coordinates are rounded after using a sine.
 
 mod basic;
+pub mod chess;
+mod model;
 mod odd;
+mod sweep;
 mod tagged;
 
 pub use basic::{
