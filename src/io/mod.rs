@@ -9,6 +9,7 @@
 
 pub mod exr;
 pub mod obj;
+pub mod obj_write;
 pub mod picture;
 pub mod png;
 pub mod scene_file;

@@ -1,9 +1,9 @@
 //! Where generators put a mesh, piece by piece, so that ten million faces never have to be held.
 
 use super::{ControlMesh, Corner, Crease};
-use crate::error::Result;
 use crate::ids::VertexId;
 use glam::{DAffine3, DVec3};
+use std::io::Result;
 
 /// A receiver of vertices, faces and sharpness.
 ///
