@@ -10,15 +10,24 @@
 
 mod basic;
 pub mod chess;
+mod city;
+mod crowd;
+mod ground;
+mod hello;
 mod model;
+mod noise;
 mod odd;
+mod scan;
 mod sweep;
 mod tagged;
 
 pub use basic::{
     cube, cube_sphere, globe, n_gon, octahedron, plane, pole, prism, quad_pole, strip, tetrahedron, torus,
 };
+pub use crowd::Crowd;
+pub use ground::Ground;
 pub use odd::{bow_tie, fin, moebius, pinched, repeated_vertex, valence_two, valence_two_closed};
+pub use scan::Scan;
 pub use tagged::{
     boundary_sheet, chaikin_cube, corner_cube, crease_cube, crease_loop_cube, hole_cube, smooth_octahedron,
 };
@@ -100,6 +109,21 @@ fn polygons<F: AsRef<[u32]>>(positions: Vec<DVec3>, faces: impl IntoIterator<Ite
     }
     debug_assert!(mesh.validate().is_ok());
     mesh
+}
+
+/// Meshes that the scenes of this project are made of, by the stem of their file in `scenes/meshes`.
+pub fn scene_meshes() -> Vec<NamedShape> {
+    let chess = [
+        ("chess-pawn", chess::pawn()),
+        ("chess-rook", chess::rook()),
+        ("chess-knight", chess::knight()),
+        ("chess-bishop", chess::bishop()),
+        ("chess-queen", chess::queen()),
+        ("chess-king", chess::king()),
+        ("chess-board", chess::board()),
+        ("chess-frame", chess::frame()),
+    ];
+    hello::meshes().into_iter().chain(chess).chain(city::meshes()).collect()
 }
 
 /// Point `i` of `n` on the circle of the given radius about the y axis, from +x towards -z, so that a loop of points

@@ -56,20 +56,26 @@ pub fn plane(n_x: u32, n_z: u32) -> ControlMesh {
 /// A cube with `n` times `n` quads a side, its vertices on the unit sphere.
 pub fn cube_sphere(n: u32) -> ControlMesh {
     let n = n as i32;
+    block(IVec3::splat(n), |p| round((2 * p - IVec3::splat(n)).as_dvec3().normalize()))
+}
+
+/// The surface of a block of `n.x * n.y * n.z` cubes: unit quads between the lattice points 0 and `n`, each put at `place`.
+pub(super) fn block(n: IVec3, place: impl Fn(IVec3) -> DVec3) -> ControlMesh {
     let mut ids = HashMap::new();
     let mut positions = Vec::new();
     let mut vertex = |p: IVec3| {
         *ids.entry(p).or_insert_with(|| {
-            positions.push(round((2 * p - IVec3::splat(n)).as_dvec3().normalize()));
+            positions.push(place(p));
             positions.len() as u32 - 1
         })
     };
     let mut faces = Vec::new();
     for axis in 0..3 {
-        let (u, v) = (IVec3::AXES[(axis + 1) % 3], IVec3::AXES[(axis + 2) % 3]);
-        for k in 0..n * n {
-            let low = u * (k % n) + v * (k / n);
-            let high = low + IVec3::AXES[axis] * n;
+        let (iu, iv) = ((axis + 1) % 3, (axis + 2) % 3);
+        let (u, v) = (IVec3::AXES[iu], IVec3::AXES[iv]);
+        for k in 0..n[iu] * n[iv] {
+            let low = u * (k % n[iu]) + v * (k / n[iu]);
+            let high = low + IVec3::AXES[axis] * n[axis];
             faces.push([low, low + v, low + u + v, low + u].map(&mut vertex));
             faces.push([high, high + u, high + u + v, high + v].map(&mut vertex));
         }

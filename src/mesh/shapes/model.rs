@@ -54,6 +54,14 @@ impl Model {
         vertices.iter().map(|&v| self.positions[v as usize]).sum::<DVec3>() / vertices.len() as f64
     }
 
+    /// The face of `candidates` (any, if empty) whose centre lies farthest in a direction.
+    pub fn farthest(&self, candidates: &[usize], direction: DVec3) -> usize {
+        let all: Vec<_> = (0..self.faces.len()).collect();
+        let candidates = if candidates.is_empty() { &all } else { candidates };
+        let along = |&&f: &&usize| self.center(&[f]).dot(direction);
+        *candidates.iter().max_by(|a, b| along(a).total_cmp(&along(b))).expect("a model has faces")
+    }
+
     /// Pulls a region of faces out of the surface: it moves by `new_from_old`, quads close the gap.
     /// Returns the faces of the new wall.
     pub fn extrude(&mut self, region: &[usize], new_from_old: impl Fn(DVec3) -> DVec3) -> Vec<usize> {
