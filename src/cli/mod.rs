@@ -6,6 +6,7 @@
 //!
 //! Help lists the flags that change the picture apart from those that only change speed: [`PICTURE`] and [`SPEED`].
 
+mod generate;
 pub mod stdout;
 
 use crate::error::{Error, Result};
@@ -28,12 +29,16 @@ pub struct Cli {
 }
 
 #[derive(Subcommand, Debug)]
-enum Command {}
+enum Command {
+    Generate(generate::GenerateArgs),
+}
 
 impl Cli {
     /// Does what was asked for.
     pub fn run(self) -> Result<()> {
-        match self.command {}
+        match self.command {
+            Command::Generate(args) => args.run(),
+        }
     }
 }
 

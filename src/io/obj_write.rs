@@ -11,7 +11,8 @@ use crate::mesh::{
 };
 use glam::DVec3;
 use std::fmt::Write as _;
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 /// A sink that writes OBJ text.
@@ -21,18 +22,20 @@ pub struct ObjWriter<W> {
     line: String,
 }
 
-/// Creates or replaces the file `path` with what `fill` puts into the sink.
-pub fn write_obj(path: &Path, fill: impl FnOnce(&mut dyn MeshSink) -> io::Result<()>) -> Result<()> {
-    write_whole(path, |out| {
-        let mut writer = ObjWriter::new(out);
-        fill(&mut writer)
-    })
+/// Creates or replaces the file `path` with what `fill` writes.
+pub fn write_obj(path: &Path, fill: impl FnOnce(&mut ObjWriter<&mut BufWriter<File>>) -> io::Result<()>) -> Result<()> {
+    write_whole(path, |out| fill(&mut ObjWriter::new(out)))
 }
 
 impl<W: Write> ObjWriter<W> {
     /// A writer at the start of its file.
     pub fn new(out: W) -> Self {
         Self { out, line: String::new() }
+    }
+
+    /// Writes a comment line.
+    pub fn comment(&mut self, text: &str) -> io::Result<()> {
+        self.write(format_args!("# {text}"))
     }
 
     /// Writes a whole mesh with all its tags.

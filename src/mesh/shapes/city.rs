@@ -103,7 +103,7 @@ impl Block {
             let size = DVec3::new(1.0, random.within(0.9, 1.5), 1.0) * random.within(0.25, 0.5);
             (tree(), DAffine3::from_translation(position) * DAffine3::from_scale(size))
         };
-        (0..26).map(tree).collect()
+        (0..18).map(tree).collect()
     }
 }
 

@@ -1,0 +1,196 @@
+//! `lazytess generate`: control meshes of this program's making, as OBJ.
+
+use crate::error::{Error, Result};
+use crate::ids::VertexId;
+use crate::io::obj_write::{ObjWriter, write_obj};
+use crate::mesh::shapes::{self, Crowd, Ground, NamedShape, Scan};
+use crate::mesh::{ControlMesh, Corner, Crease, MeshSink};
+use clap::Args;
+use glam::DVec3;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io;
+use std::path::PathBuf;
+
+/// Write a control mesh of this program's making as OBJ
+///
+/// Meshes of any size, made without holding them in memory: ground (mountains, quads only), scan (an irregular closed
+/// mesh of quads and triangles), crowd (puppets, no two alike). Meshes with one vertex or face of any valence: pole,
+/// quad-pole, globe, prism, n-gon. And by name every mesh of scenes/meshes (such as chess-knight) and every shape of the
+/// test corpus; a name that does not exist lists them all. The same arguments give the same file on every machine.
+#[derive(Args, Debug)]
+pub struct GenerateArgs {
+    /// What to make
+    kind: String,
+    /// File to write
+    #[arg(short, long, value_name = "OUT.obj")]
+    output: PathBuf,
+    /// About how many faces (ground, scan, crowd); reads like 5000, 20k or 10M (decimal) [default: 10k]
+    #[arg(long, value_name = "N", value_parser = parse_count)]
+    faces: Option<u64>,
+    /// Which of the meshes of that kind (ground, scan, crowd) [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Edges at the middle vertex, or corners of the big face (pole, quad-pole, globe, prism, n-gon) [default: 8]
+    #[arg(long, value_name = "N")]
+    valence: Option<u32>,
+    /// No progress bar
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Face corners are numbered in 31 bits; scans and crowds have up to five percent more faces than asked.
+const MAX_FACES: u64 = 500_000_000;
+
+/// Larger polygons and poles mean nothing that smaller ones do not.
+const MAX_VALENCE: u32 = 1_000_000;
+
+/// What to write, checked.
+enum Job {
+    Ground(Ground),
+    Scan(Scan),
+    Crowd(Crowd),
+    Mesh(Box<ControlMesh>),
+}
+
+impl GenerateArgs {
+    /// Writes the mesh.
+    pub fn run(&self) -> Result<()> {
+        let job = self.job()?;
+        let comment = format!("made by: lazytess generate {}", self.arguments());
+        let bar = self.progress_bar(&job);
+        write_obj(&self.output, |writer| {
+            writer.comment(&comment)?;
+            match &job {
+                Job::Ground(ground) => ground.write(&mut Watched { writer, bar: &bar }),
+                Job::Scan(scan) => scan.write(&mut Watched { writer, bar: &bar }),
+                Job::Crowd(crowd) => crowd.write(&mut Watched { writer, bar: &bar }),
+                Job::Mesh(mesh) => writer.mesh(mesh),
+            }
+        })?;
+        bar.finish_and_clear();
+        Ok(())
+    }
+
+    fn job(&self) -> Result<Job> {
+        let sized = |job: fn(u64, u64) -> Job| self.sized(job);
+        let valent = |shape: fn(u32) -> ControlMesh| self.valent(shape);
+        match self.kind.as_str() {
+            "ground" => sized(|faces, seed| Job::Ground(Ground { n: (faces as f64).sqrt().round() as u32, seed })),
+            "scan" => sized(|faces, seed| Job::Scan(Scan::new(faces, seed))),
+            "crowd" => sized(|faces, seed| Job::Crowd(Crowd::new(faces, seed))),
+            "pole" => valent(shapes::pole),
+            "quad-pole" => valent(shapes::quad_pole),
+            "globe" => valent(|n| shapes::globe(n, 5)),
+            "prism" => valent(shapes::prism),
+            "n-gon" => valent(shapes::n_gon),
+            name => self.named(name),
+        }
+    }
+
+    fn sized(&self, job: fn(u64, u64) -> Job) -> Result<Job> {
+        self.reject("valence", self.valence.is_some())?;
+        let faces = self.faces.unwrap_or(10_000);
+        if faces == 0 || faces > MAX_FACES {
+            return Err(Error::input(format!("--faces {faces} cannot be made: choose 1 to {MAX_FACES}")));
+        }
+        Ok(job(faces, self.seed.unwrap_or(1)))
+    }
+
+    fn valent(&self, shape: fn(u32) -> ControlMesh) -> Result<Job> {
+        self.reject("faces", self.faces.is_some())?;
+        self.reject("seed", self.seed.is_some())?;
+        let valence = self.valence.unwrap_or(8);
+        if !(3..=MAX_VALENCE).contains(&valence) {
+            return Err(Error::input(format!("--valence {valence} cannot be made: choose 3 to {MAX_VALENCE}")));
+        }
+        Ok(Job::Mesh(Box::new(shape(valence))))
+    }
+
+    fn named(&self, name: &str) -> Result<Job> {
+        let meshes: Vec<NamedShape> = shapes::scene_meshes().into_iter().chain(shapes::all()).collect();
+        let names: Vec<_> = meshes.iter().map(|&(name, _)| name).collect();
+        let unknown = || {
+            let any = "ground, scan, crowd, pole, quad-pole, globe, prism, n-gon";
+            Error::input(format!("there is no mesh '{name}': choose one of {any}, {}", names.join(", ")))
+        };
+        let i = names.iter().position(|&known| known == name).ok_or_else(unknown)?;
+        self.reject("faces", self.faces.is_some())?;
+        self.reject("seed", self.seed.is_some())?;
+        self.reject("valence", self.valence.is_some())?;
+        Ok(Job::Mesh(meshes.into_iter().nth(i).map(|(_, mesh)| Box::new(mesh)).unwrap_or_default()))
+    }
+
+    fn reject(&self, option: &str, given: bool) -> Result<()> {
+        let kind = &self.kind;
+        if given { Err(Error::input(format!("--{option} does not change a {kind}: leave it out"))) } else { Ok(()) }
+    }
+
+    /// The arguments that decide the file's content, as they could be typed again.
+    fn arguments(&self) -> String {
+        let option = |name, value: Option<u64>| value.map_or(String::new(), |value| format!(" --{name} {value}"));
+        let valence = self.valence.map(u64::from);
+        let options = [("faces", self.faces), ("seed", self.seed), ("valence", valence)];
+        self.kind.clone() + &options.map(|(name, value)| option(name, value)).concat()
+    }
+
+    /// Counts faces; hidden without a terminal.
+    fn progress_bar(&self, job: &Job) -> ProgressBar {
+        if self.quiet || matches!(job, Job::Mesh(_)) {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(self.faces.unwrap_or(10_000));
+        let style = ProgressStyle::with_template("{bar:40} {human_pos}/{human_len} faces, {eta} left");
+        bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    }
+}
+
+/// A sink that moves the progress bar every so many faces.
+struct Watched<'a, W> {
+    writer: &'a mut ObjWriter<W>,
+    bar: &'a ProgressBar,
+}
+
+impl<W: io::Write> MeshSink for Watched<'_, W> {
+    fn vertex(&mut self, position: DVec3) -> io::Result<()> {
+        self.writer.vertex(position)
+    }
+
+    fn face(&mut self, corners: &[VertexId]) -> io::Result<()> {
+        self.bar.inc(1);
+        self.writer.face(corners)
+    }
+
+    fn crease(&mut self, crease: Crease) -> io::Result<()> {
+        self.writer.crease(crease)
+    }
+
+    fn corner(&mut self, corner: Corner) -> io::Result<()> {
+        self.writer.corner(corner)
+    }
+}
+
+/// A number of things, with `k` for thousands and `M` for millions.
+fn parse_count(text: &str) -> Result<u64, String> {
+    let (digits, unit) = match text.char_indices().next_back() {
+        Some((end, 'k')) => (&text[..end], 1000),
+        Some((end, 'M')) => (&text[..end], 1_000_000),
+        _ => (text, 1),
+    };
+    let count = digits.parse::<u64>().ok().and_then(|n| n.checked_mul(unit));
+    count.ok_or_else(|| "write a number such as 5000, 20k or 10M".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_have_decimal_units() {
+        assert_eq!(parse_count("5000"), Ok(5000));
+        assert_eq!(parse_count("20k"), Ok(20_000));
+        assert_eq!(parse_count("10M"), Ok(10_000_000));
+        for bad in ["", "k", "-1", "1.5M", "99999999999999999999", "9999999999999999M", "10é"] {
+            assert!(parse_count(bad).is_err(), "{bad}");
+        }
+    }
+}
