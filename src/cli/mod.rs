@@ -6,8 +6,14 @@
 //!
 //! Help lists the flags that change the picture apart from those that only change speed: [`PICTURE`] and [`SPEED`].
 
+pub mod camera;
 mod generate;
+pub mod input;
+pub mod interrupt;
+pub mod progress;
+pub mod run_options;
 pub mod stdout;
+pub mod values;
 
 use crate::error::{Error, Result};
 use clap::{Parser, Subcommand};

@@ -12,5 +12,6 @@ pub mod obj;
 pub mod obj_write;
 pub mod picture;
 pub mod png;
+pub mod process;
 pub mod scene_file;
 pub mod write;

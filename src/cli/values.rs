@@ -1,0 +1,150 @@
+//! Values as they are typed: sizes, vectors, windows. Each parser's message says what to write.
+
+use crate::cache::Capacity;
+use glam::DVec3;
+use std::str::FromStr;
+
+/// A number of bytes, typed like `64M`, `1.5G`, `200000`. Units are binary: K is 1024.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ByteSize(pub u64);
+
+impl FromStr for ByteSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("'{text}' is no size: write bytes, or a number with K, M, G or T such as 64M");
+        let split = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+        let (number, unit) = text.split_at(split);
+        let shift = match unit.to_ascii_uppercase().trim_end_matches('B').trim_end_matches('I') {
+            "" if unit.is_empty() || unit.eq_ignore_ascii_case("B") => 0,
+            "K" => 10,
+            "M" => 20,
+            "G" => 30,
+            "T" => 40,
+            _ => return Err(wrong()),
+        };
+        let bytes = number.parse::<f64>().map_err(|_| wrong())? * (1u64 << shift) as f64;
+        // Beyond 2^53 a size typed in decimals has no exact number of bytes, and no machine has them.
+        if bytes <= (1u64 << 53) as f64 { Ok(Self(bytes as u64)) } else { Err(wrong()) }
+    }
+}
+
+/// The size of a cache: a [`ByteSize`] or `unbounded`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum CacheSize {
+    /// At most so many bytes of grids; 0 keeps none.
+    Bytes(u64),
+    /// Nothing is ever evicted.
+    Unbounded,
+}
+
+impl CacheSize {
+    /// The cache's capacity, when all blocks that could be built take at most `all_blocks` bytes.
+    pub fn capacity(self, all_blocks: usize) -> Capacity {
+        match self {
+            Self::Bytes(bytes) => Capacity::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX)),
+            Self::Unbounded => Capacity::Unbounded { at_most: all_blocks },
+        }
+    }
+}
+
+impl FromStr for CacheSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "unbounded" => Ok(Self::Unbounded),
+            size => size.parse().map(|ByteSize(bytes)| Self::Bytes(bytes)).map_err(|e| e + ", or unbounded"),
+        }
+    }
+}
+
+/// `WxH` in pixels.
+pub fn picture_size(text: &str) -> Result<[u32; 2], String> {
+    let wrong = || format!("'{text}' is no picture size: write WIDTHxHEIGHT, each in 1..65536, such as 800x600");
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(wrong)?;
+    let side = |text: &str| text.parse().ok().filter(|n| (1..=65536).contains(n)).ok_or_else(wrong);
+    Ok([side(width)?, side(height)?])
+}
+
+/// `x,y,z`.
+pub fn vector(text: &str) -> Result<DVec3, String> {
+    let wrong = || format!("'{text}' is no point: write three finite numbers, such as 1,2.5,-3");
+    numbers::<f64, 3>(text).map(DVec3::from_array).filter(|v| v.is_finite()).ok_or_else(wrong)
+}
+
+/// `x0,x1,y0,y1`: columns x0 to x1 - 1, rows y0 to y1 - 1, row 0 at the top.
+pub fn crop(text: &str) -> Result<[u32; 4], String> {
+    let wrong = || format!("'{text}' is no window: write x0,x1,y0,y1 with x0 < x1 and y0 < y1, such as 0,100,50,80");
+    numbers::<u32, 4>(text).filter(|[x0, x1, y0, y1]| x0 < x1 && y0 < y1).ok_or_else(wrong)
+}
+
+/// A finite number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0);
+    value.ok_or_else(|| format!("'{text}' is no number above 0"))
+}
+
+/// A finite number, 0 or more.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0);
+    value.ok_or_else(|| format!("'{text}' is no number from 0 up"))
+}
+
+/// A count, 1 or more.
+pub fn count(text: &str) -> Result<u32, String> {
+    text.parse().ok().filter(|&n| n > 0).ok_or_else(|| format!("'{text}' is no count: write a whole number from 1 up"))
+}
+
+/// Exactly `N` values between commas.
+fn numbers<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
+    let values: Option<Vec<T>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    values?.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_binary() {
+        let bytes = |text: &str| text.parse::<ByteSize>().map(|size| size.0);
+        assert_eq!(bytes("0"), Ok(0));
+        assert_eq!(bytes("1000"), Ok(1000));
+        assert_eq!(bytes("64M"), Ok(64 << 20));
+        assert_eq!(bytes("1.5g"), Ok(3 << 29));
+        assert_eq!(bytes("2GiB"), Ok(2 << 30));
+        assert_eq!(bytes("7kb"), Ok(7 << 10));
+        assert_eq!(bytes("12B"), Ok(12));
+        for bad in ["", "M", "-1", "1X", "1.2.3M", "1e6", "64 M", "nan", "9999999T", "iB", "1i"] {
+            assert!(bytes(bad).unwrap_err().contains("is no size"), "{bad}");
+        }
+        assert_eq!("unbounded".parse(), Ok(CacheSize::Unbounded));
+        assert_eq!("16M".parse(), Ok(CacheSize::Bytes(16 << 20)));
+        assert!("all".parse::<CacheSize>().unwrap_err().ends_with(", or unbounded"));
+    }
+
+    #[test]
+    fn pictures_points_and_windows_are_read() {
+        assert_eq!(picture_size("800x600"), Ok([800, 600]));
+        assert_eq!(vector("1,-2.5, 1e3"), Ok(DVec3::new(1.0, -2.5, 1000.0)));
+        assert_eq!(crop("0,10,5,6"), Ok([0, 10, 5, 6]));
+        for bad in ["800", "0x5", "800x", "x", "-1x2", "65537x1", "8x8x8"] {
+            assert!(picture_size(bad).is_err(), "{bad}");
+        }
+        for bad in ["1,2", "1,2,3,4", "1,2,inf", "a,b,c", ""] {
+            assert!(vector(bad).is_err(), "{bad}");
+        }
+        for bad in ["0,0,0,1", "1,0,0,1", "0,1,1,1", "0,1,2", "-1,1,0,1"] {
+            assert!(crop(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn numbers_keep_their_bounds() {
+        assert_eq!((positive("0.5"), not_negative("0"), count("3")), (Ok(0.5), Ok(0.0), Ok(3)));
+        assert!(positive("0").is_err() && positive("inf").is_err() && positive("nan").is_err());
+        assert!(not_negative("-0.1").is_err() && not_negative("nan").is_err());
+        assert!(count("0").is_err() && count("1.5").is_err());
+    }
+}
