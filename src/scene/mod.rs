@@ -3,4 +3,8 @@
 //! A [`description::SceneDescription`] is what the user wrote, checked but with no mesh read.
 
 pub mod accel;
+pub mod camera;
 pub mod description;
+pub mod light;
+pub mod material;
+pub mod rate;

@@ -1,0 +1,92 @@
+//! Integrators: from a camera ray to the radiance it brings back.
+//!
+//! A [`Shader`] is a thread's tracer with the scene's appearance and the thread's scratch. Every integrator is a method
+//! of it in a file of its own; they share an **interaction** (a hit made ready for shading) and direct light.
+//!
+//! # Conventions
+//! * Opaque surfaces are two-sided: normals are turned towards the ray. Which side of a clear body a ray meets is told
+//!   by the geometric normal, so clear bodies must be closed and their faces counter-clockwise from outside.
+//! * A ray that leaves a surface starts off it by the hit's own error bound, along the geometric normal on the side it
+//!   leaves to, and names the triangle it leaves: there is no epsilon to choose.
+//! * A chain of reflections, refractions or bounces ends after `max_depth` rays; what it would have brought is lost.
+//!
+//! Whitted, "An improved illumination model for shaded display", CACM 1980; Kajiya, "The rendering equation", 1986.
+
+mod ambient_occlusion;
+mod debug;
+mod direct;
+mod interaction;
+mod path;
+mod whitted;
+
+use super::film::FirstHit;
+use super::rays::{RayCounts, RayKind};
+use super::sampler::Sampler;
+use super::settings::{Appearance, RenderSettings};
+use super::tracer::Tracer;
+use crate::math::Ray;
+use crate::scene::camera::Camera;
+use crate::scene::description::IntegratorKind;
+use glam::Vec3;
+use interaction::Interaction;
+use whitted::PendingRay;
+
+/// What one camera ray brings back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Linear RGB.
+    pub radiance: Vec3,
+    /// What the ray hit.
+    pub first: FirstHit,
+}
+
+/// A thread's means of turning rays into radiance.
+pub struct Shader<'a, T> {
+    tracer: &'a mut T,
+    appearance: &'a Appearance,
+    settings: &'a RenderSettings,
+    rays: RayCounts,
+    pending: Vec<PendingRay>,
+}
+
+impl<'a, T: Tracer> Shader<'a, T> {
+    /// A shader that asks `tracer`.
+    pub fn new(tracer: &'a mut T, appearance: &'a Appearance, settings: &'a RenderSettings) -> Self {
+        Self { tracer, appearance, settings, rays: RayCounts::default(), pending: Vec::new() }
+    }
+
+    /// Rays traced so far.
+    pub fn rays(&self) -> RayCounts {
+        self.rays
+    }
+
+    /// Blocks that the tracer has built so far.
+    pub fn misses(&self) -> u64 {
+        self.tracer.misses()
+    }
+
+    /// Traces a ray of `camera` and gathers light by the integrator of the settings.
+    pub fn sample(&mut self, camera: &Camera, ray: Ray, sampler: Sampler) -> Sample {
+        let misses_before = self.misses();
+        let hit = self.closest(RayKind::Primary, &ray);
+        let radiance = match (&hit, self.settings.integrator) {
+            (None, _) => self.appearance.background,
+            (Some(x), IntegratorKind::Whitted) => self.whitted(x),
+            (Some(x), IntegratorKind::Ao) => self.ambient_occlusion(x, sampler),
+            (Some(x), IntegratorKind::Path) => self.path(*x, sampler),
+            (Some(x), IntegratorKind::Debug(view)) => self.debug_color(view, x, camera, misses_before),
+        };
+        Sample { radiance, first: hit.map_or(FirstHit::NONE, |x| x.first_hit(camera)) }
+    }
+
+    fn closest(&mut self, kind: RayKind, ray: &Ray) -> Option<Interaction<'a>> {
+        self.rays.count(kind);
+        let hit = self.tracer.closest(ray)?;
+        let point = self.tracer.surface_point(ray, &hit);
+        let material = &self.appearance.materials[hit.primitive.mesh.idx()];
+        Some(Interaction::new(ray, hit, point, material))
+    }
+}
+
+#[cfg(test)]
+mod tests;

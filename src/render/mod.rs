@@ -1,0 +1,38 @@
+//! From rays to a picture: integrators, the film they expose, and the threads that do the work.
+//!
+//! A **tracer** answers rays and describes what they hit; each worker thread has its own. An **integrator** turns a
+//! camera ray into a colour. The **film** holds, for each pixel of a window, the colour and the asked-for **AOVs**
+//! (arbitrary output variables: depth, normal, ids), and knows which pixels are done. **Settings** come in two kinds:
+//! [`RenderSettings`] say what the picture is, [`RunSettings`] only how it is made.
+//!
+//! ```text
+//!     TileOrder ──tile──▶ worker { Tracer, Shader, records } ──records──▶ Film
+//!                            │  for each pixel, for each sample: Camera::ray ─▶ Shader::sample
+//!                            └─ counts rays by kind, asks `cancel`, tells `progress`
+//! ```
+//!
+//! # Invariants
+//! 1. A pixel is a function of the scene, the camera and the render settings: every random number is a function of
+//!    (seed, pixel, sample, purpose). Threads, tile size and crop window change nothing.
+//! 2. Nothing is allocated per ray, pixel or tile.
+//! 3. Colours are linear RGB radiance; the film never tone maps.
+//!
+//! Read [`tracer`] first, then [`integrators`], [`film`] and [`workers`].
+
+#[cfg(test)]
+mod analytic;
+pub mod film;
+pub mod integrators;
+pub mod rays;
+pub mod sampler;
+pub mod settings;
+pub mod tiles;
+pub mod tracer;
+pub mod workers;
+
+pub use film::{Aov, Film, FirstHit, PixelRecord, PlaneData};
+pub use rays::{RayCounts, RayKind};
+pub use settings::{Appearance, Progress, RenderSettings, RunSettings};
+pub use tiles::{PixelRect, TileOrder};
+pub use tracer::{SurfacePoint, Tracer};
+pub use workers::{Rendered, render};

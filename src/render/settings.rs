@@ -1,0 +1,92 @@
+//! What to render, and apart from it how.
+
+use super::film::Aov;
+use super::tiles::PixelRect;
+use crate::scene::description::{IntegratorKind, Light, Material};
+use crate::scene::light::sky_radiance;
+use glam::Vec3;
+use std::sync::atomic::AtomicBool;
+
+/// What the picture is. Equal settings and scenes give equal bytes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Width and height of the whole picture in pixels, each at least 1.
+    pub size: [u32; 2],
+    /// The pixels to render, within the whole picture; each gets the value it has there.
+    pub window: PixelRect,
+    /// Samples per pixel, at least 1, averaged with equal weight (a box filter). Sample 0 is at the pixel's centre.
+    pub spp: u32,
+    /// How light is gathered.
+    pub integrator: IntegratorKind,
+    /// Longest chain of reflections, refractions and bounces; light beyond is lost.
+    pub max_depth: u32,
+    /// Rays per sample of the `ao` integrator, at least 1.
+    pub ao_samples: u32,
+    /// Seed of all random numbers.
+    pub seed: u32,
+    /// What to store besides colour.
+    pub aovs: Vec<Aov>,
+}
+
+impl RenderSettings {
+    /// A whole picture of `size` pixels, one sample each, by the `whitted` integrator.
+    pub fn of_size(size: [u32; 2]) -> Self {
+        Self {
+            size,
+            window: PixelRect::whole(size),
+            spp: 1,
+            integrator: IntegratorKind::Whitted,
+            max_depth: 8,
+            ao_samples: 16,
+            seed: 0,
+            aovs: Vec::new(),
+        }
+    }
+}
+
+/// How the picture is made. None of it changes the picture.
+#[derive(Clone, Copy)]
+pub struct RunSettings<'a> {
+    /// Worker threads, at least 1.
+    pub threads: usize,
+    /// Side of a tile in pixels, at least 1.
+    pub tile_side: u32,
+    /// Set it to stop after the tiles at work; the film then holds what is done.
+    pub cancel: &'a AtomicBool,
+    /// Called by the workers after each tile.
+    pub progress: &'a (dyn Fn(Progress) + Sync),
+}
+
+impl<'a> RunSettings<'a> {
+    /// Tiles of 16 × 16 pixels and no report of progress.
+    pub fn quiet(threads: usize, cancel: &'a AtomicBool) -> Self {
+        Self { threads, tile_side: 16, cancel, progress: &|_| () }
+    }
+}
+
+/// How far a render has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Pixels done.
+    pub done: usize,
+    /// Pixels to do.
+    pub total: usize,
+}
+
+/// How things look: everything of a scene that is neither geometry nor camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Appearance {
+    pub(super) materials: Vec<Material>,
+    pub(super) lights: Vec<Light>,
+    pub(super) background: Vec3,
+    pub(super) sky: Vec3,
+    pub(super) any_glass: bool,
+}
+
+impl Appearance {
+    /// `materials[i]` belongs to `MeshId(i)`; `background` is seen by rays that leave the scene and lights nothing.
+    pub fn new(materials: Vec<Material>, lights: Vec<Light>, background: Vec3) -> Self {
+        let any_glass = materials.iter().any(|material| material.glass.is_some());
+        Self { sky: sky_radiance(&lights), any_glass, materials, lights, background }
+    }
+}

@@ -1,0 +1,32 @@
+//! What integrators ask of the scene.
+
+use crate::math::{Hit, Intersect, PrimitiveRef, Ray};
+use glam::{DVec3, Vec2};
+
+/// The surface at a hit, in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Where the ray met the triangle.
+    pub position: DVec3,
+    /// Unit normal of the triangle, along du × dv: outwards on a mesh with counter-clockwise faces.
+    pub geometric_normal: DVec3,
+    /// Unit normal of the limit surface, on the same side.
+    pub shading_normal: DVec3,
+    /// Texture coordinates, if the mesh has them.
+    pub tex_coord: Option<Vec2>,
+    /// Bound on the distance of `position` from the triangle's plane, in world units: rays that leave the surface start
+    /// that far from it.
+    pub error: f64,
+}
+
+/// One thread's access to the scene: ray queries, and answers about what was hit.
+pub trait Tracer: Intersect {
+    /// The surface where `ray` hit; `hit` is what [`Intersect::closest`] returned for it.
+    fn surface_point(&mut self, ray: &Ray, hit: &Hit) -> SurfacePoint;
+
+    /// Largest rate of the four edges of the patch that `primitive` is part of.
+    fn patch_rate(&self, primitive: &PrimitiveRef) -> u32;
+
+    /// How many blocks (grid pieces and tree nodes) this tracer has had to build so far.
+    fn misses(&self) -> u64;
+}

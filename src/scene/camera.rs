@@ -1,0 +1,128 @@
+//! The pinhole camera and its primary rays.
+
+use super::description::CameraDescription;
+use crate::math::{DBounds, Ray};
+use glam::{DVec2, DVec3};
+
+/// Vertical field of view of the default camera, in degrees.
+const DEFAULT_FOV: f64 = 35.0;
+/// Distance of the default camera from the centre of what it frames, in diagonals of its box.
+const DEFAULT_DISTANCE: f64 = 1.35;
+
+/// A pinhole camera in world space, ready to make rays. All arithmetic is f64.
+///
+/// ```text
+///     pixel (0,0) ┌──────────┐        row 0 is the top row; pixel (x, y) covers [x, x+1) × [y, y+1)
+///                 │    up    │        sx = (x / W · 2 − 1) · h · W / H      h = tan(fov / 2)
+///                 │    └ right        sy = (1 − y / H · 2) · h
+///                 └──────────┘ (W,H)  direction = normalize(forward + sx · right + sy · up)
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    eye: DVec3,
+    forward: DVec3,
+    right: DVec3,
+    up: DVec3,
+    tan_half_fov: f64,
+    focus_distance: f64,
+}
+
+impl Camera {
+    /// The camera that `description` asks for.
+    pub fn new(description: &CameraDescription) -> Self {
+        let CameraDescription { eye, at, up, fov } = *description;
+        let forward = (at - eye).normalize();
+        let right = forward.cross(up).normalize();
+        Self {
+            eye,
+            forward,
+            right,
+            up: right.cross(forward),
+            tan_half_fov: (fov * std::f64::consts::PI / 360.0).tan(),
+            focus_distance: (at - eye).length(),
+        }
+    }
+
+    /// Position of the pinhole.
+    pub fn eye(&self) -> DVec3 {
+        self.eye
+    }
+
+    /// Unit vector into the picture.
+    pub fn forward(&self) -> DVec3 {
+        self.forward
+    }
+
+    /// Distance from the eye to the point it looks at: the scale of `debug:depth`.
+    pub fn focus_distance(&self) -> f64 {
+        self.focus_distance
+    }
+
+    /// The ray through `raster`, in pixels from the top left corner, of a picture of `size` pixels. Its direction has
+    /// length 1. The centre of pixel (x, y) is (x + 0.5, y + 0.5).
+    pub fn ray(&self, raster: DVec2, [width, height]: [u32; 2]) -> Ray {
+        let (w, h) = (f64::from(width), f64::from(height));
+        let sx = (raster.x / w * 2.0 - 1.0) * self.tan_half_fov * w / h;
+        let sy = (1.0 - raster.y / h * 2.0) * self.tan_half_fov;
+        Ray::new(self.eye, (self.forward + sx * self.right + sy * self.up).normalize())
+    }
+
+    /// How many pixels a length of 1 covers at distance 1, in the middle of a picture `height` pixels high.
+    pub fn pixels_per_unit(&self, height: u32) -> f64 {
+        f64::from(height) / (2.0 * self.tan_half_fov)
+    }
+}
+
+impl CameraDescription {
+    /// The default camera: looks at the centre of `bounds` (world space, of the vertices that faces use) from direction
+    /// (1, 0.6, 1.2), 1.35 diagonals away. A box without extent is framed as if its diagonal were 1.
+    pub fn framing(bounds: DBounds) -> Self {
+        let at = if bounds.is_empty() { DVec3::ZERO } else { bounds.center() };
+        let diagonal = if bounds.diagonal() > 0.0 { bounds.diagonal() } else { 1.0 };
+        let eye = at + (DEFAULT_DISTANCE * diagonal) * DVec3::new(1.0, 0.6, 1.2).normalize();
+        Self { eye, at, up: DVec3::Y, fov: DEFAULT_FOV }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube_camera() -> Camera {
+        let bounds = [DVec3::splat(-1.0), DVec3::splat(1.0)].into_iter().collect();
+        Camera::new(&CameraDescription::framing(bounds))
+    }
+
+    #[test]
+    fn default_camera_stands_where_the_formula_says() {
+        let camera = cube_camera();
+        let expected = 1.35 * 12.0_f64.sqrt() / 2.8_f64.sqrt() * DVec3::new(1.0, 0.6, 1.2);
+        assert!((camera.eye() - expected).length() < 1e-14);
+        assert!((camera.forward() + expected.normalize()).length() < 1e-15);
+    }
+
+    #[test]
+    fn the_middle_of_the_picture_looks_forward() {
+        let ray = cube_camera().ray(DVec2::new(400.0, 300.0), [800, 600]);
+        assert!((ray.direction - cube_camera().forward()).length() < 1e-15);
+    }
+
+    #[test]
+    fn row_zero_is_at_the_top_and_half_the_field_of_view_above_the_middle() {
+        let camera = cube_camera();
+        let top = camera.ray(DVec2::new(400.0, 0.0), [800, 600]).direction;
+        assert!(top.y > camera.forward().y);
+        assert!((top.dot(camera.forward()).acos().to_degrees() - DEFAULT_FOV / 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn primary_rays_follow_the_formula_of_the_peers_to_the_bit() {
+        let camera = cube_camera();
+        let (x, y, w, h) = (17.0, 301.0, 800.0, 600.0);
+        let t = (35.0 * std::f64::consts::PI / 360.0).tan();
+        let (sx, sy) = (((x + 0.5) / w * 2.0 - 1.0) * t * w / h, (1.0 - (y + 0.5) / h * 2.0) * t);
+        let d = camera.forward + sx * camera.right + sy * camera.up;
+        let expected = (1.0 / (d.x * d.x + d.y * d.y + d.z * d.z).sqrt()) * d;
+        assert_eq!(camera.ray(DVec2::new(17.5, 301.5), [800, 600]).direction, expected);
+    }
+}
