@@ -1,0 +1,420 @@
+//! The lazy tracer: the one place where trees, plans, cache and grids meet.
+//!
+//! A ray walks a mesh's tree to a **leaf**, a patch. The leaf's slot leads to a block: a piece if the patch has at most
+//! 8 x 8 cells, else a node whose children are nodes or pieces in their turn. A block that is missing is built on the
+//! spot, so nothing is tessellated but what a ray reaches.
+
+use super::accel::TraversalStack;
+use super::world::{GridCache, World, WorldMesh};
+use crate::cache::{Block, BlockLayout, Claim, Pin, Slot, SlotId, Visit};
+use crate::grid::{
+    CellRect, LaneHits, LatticeHit, LatticeRay, MAX_CELLS, NODE_BYTES, NodeView, PieceLayout, PieceView, TriangleId,
+    encode_node, is_node,
+};
+use crate::ids::{MeshId, PatchId};
+use crate::math::simd::{self, Kernel, Task};
+use crate::math::{Bounds, Hit, Intersect, PrimitiveRef, Ray};
+use crate::subdiv::{Dicer, PatchRates};
+use glam::Vec3;
+
+/// Children of a node along u and v.
+const NODE_SIDE: u32 = 4;
+
+/// Quarters towards an irregular corner that a node's child boxes look into, below the child's own size.
+const CHILD_BOX_DEPTH: u32 = 3;
+
+/// One thread's access to the scene's geometry.
+pub struct Intersector<'w> {
+    world: &'w World,
+    cache: &'w GridCache,
+    pin: Pin<'w>,
+    builder: Builder,
+    stacks: Stacks,
+}
+
+/// What building a block needs.
+#[derive(Default)]
+struct Builder {
+    dicer: Dicer,
+    vertices: Vec<[i32; 3]>,
+    boxes: Vec<Bounds>,
+    n_built: u64,
+}
+
+#[derive(Default)]
+struct Stacks {
+    scene: TraversalStack,
+    mesh: TraversalStack,
+}
+
+/// A patch about to be traversed.
+#[derive(Clone, Copy)]
+struct PatchContext<'a> {
+    mesh: &'a WorldMesh,
+    patch: PatchId,
+}
+
+/// The side of a node's children in cells: 8, or as many times 4 that as leave at most 4 children a side.
+fn child_side(cells: CellRect) -> u32 {
+    let longest = cells.size().into_iter().max().expect("two sides") as u32;
+    let mut side = MAX_CELLS as u32;
+    while longest > NODE_SIDE * side {
+        side *= NODE_SIDE;
+    }
+    side
+}
+
+/// Cells of child (a, b) of a node.
+fn child_cells(parent: CellRect, side: u32, a: u32, b: u32) -> CellRect {
+    let (i0, j0) = (u32::from(parent.i0) + a * side, u32::from(parent.j0) + b * side);
+    CellRect {
+        i0: i0 as u16,
+        j0: j0 as u16,
+        i1: (i0 + side).min(u32::from(parent.i1)) as u16,
+        j1: (j0 + side).min(u32::from(parent.j1)) as u16,
+    }
+}
+
+impl Builder {
+    /// The block of a slot, built if it is missing.
+    #[inline(always)]
+    fn fetch<'v>(&mut self, visit: &'v Visit<'_>, slot: Slot<'v>, of: PatchContext<'_>, cells: CellRect) -> Block<'v> {
+        match visit.get(slot) {
+            Some(block) => block,
+            None => self.build(visit, slot, of, cells),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn build<'v>(&mut self, visit: &'v Visit<'_>, slot: Slot<'v>, of: PatchContext<'_>, cells: CellRect) -> Block<'v> {
+        let ticket = match visit.claim(slot) {
+            Claim::Ready(block) => return block,
+            Claim::Build(ticket) => ticket,
+        };
+        self.n_built += 1;
+        let rates = of.mesh.patch_rates(of.patch);
+        let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
+        if cells.size().iter().all(|&n| n <= MAX_CELLS) {
+            self.dicer.dice(of.mesh.surface(), of.patch, &rates, i, j, &mut self.vertices);
+            let layout = PieceLayout::new(&self.vertices, cells);
+            let vertices = &self.vertices;
+            return ticket.publish(BlockLayout { bytes: layout.bytes(), children: 0 }, |out| layout.encode(vertices, out));
+        }
+        let children = self.child_boxes(of, &rates, cells);
+        let n_slots = (NODE_SIDE * u32::from(children[1] - 1)) as usize + usize::from(children[0]);
+        let boxes = &self.boxes;
+        ticket.publish(BlockLayout { bytes: NODE_BYTES, children: n_slots }, |out| {
+            encode_node(cells, children, boxes, out);
+        })
+    }
+
+    /// Puts the boxes of a node's children into `self.boxes`; returns their number along u and v.
+    fn child_boxes(&mut self, of: PatchContext<'_>, rates: &PatchRates, cells: CellRect) -> [u8; 2] {
+        let side = child_side(cells);
+        let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
+        // A child's cells are a part of the patch: as many splits lead to a quarter of its size.
+        let depth = (rates.n_u.max(rates.n_v) / side).max(1).ilog2() + CHILD_BOX_DEPTH;
+        self.boxes.clear();
+        for b in 0..n_v {
+            for a in 0..n_u {
+                let c = child_cells(cells, side, a, b);
+                let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
+                self.boxes.push(self.dicer.bounds(of.mesh.surface(), of.patch, rates, i, j, depth));
+            }
+        }
+        [n_u as u8, n_v as u8]
+    }
+
+    /// The first block of a patch.
+    #[inline(always)]
+    fn fetch_root<'v>(
+        &mut self,
+        visit: &'v Visit<'_>,
+        slot: Slot<'v>,
+        of: PatchContext<'_>,
+        touch: impl Fn(),
+    ) -> Block<'v> {
+        match visit.get(slot) {
+            Some(block) => block,
+            None => {
+                touch();
+                let rates = of.mesh.patch_rates(of.patch);
+                let cells = CellRect { i0: 0, j0: 0, i1: rates.n_u as u16, j1: rates.n_v as u16 };
+                self.build(visit, slot, of, cells)
+            }
+        }
+    }
+}
+
+/// A node on the way down a patch, and which of its children are still to be seen.
+struct Level<'v> {
+    block: Block<'v>,
+    cells: CellRect,
+    side: u32,
+    hits: LaneHits,
+}
+
+/// Levels of nodes above a piece: 8 * 4^5 cells are more than [`crate::subdiv::dice::MAX_RATE`].
+const MAX_LEVELS: usize = 5;
+
+impl<'v> Level<'v> {
+    #[inline(always)]
+    fn new<K: Kernel>(kernel: K, block: Block<'v>, ray: &LatticeRay, t_max: f32) -> Self {
+        let node = NodeView::new(block.bytes());
+        let cells = node.cells();
+        Self { block, cells, side: child_side(cells), hits: node.test(kernel, ray, t_max) }
+    }
+
+    #[inline(always)]
+    fn child(&self, lane: usize) -> (Slot<'v>, CellRect) {
+        let (a, b) = (lane as u32 % NODE_SIDE, lane as u32 / NODE_SIDE);
+        (self.block.child(lane), child_cells(self.cells, self.side, a, b))
+    }
+}
+
+struct ClosestInMesh<'a, 'w> {
+    tracer: &'a mut Intersector<'w>,
+    mesh: MeshId,
+    ray: &'a LatticeRay,
+    hit: &'a mut LatticeHit,
+}
+
+impl Task for ClosestInMesh<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) {
+        let Self { tracer, mesh: id, ray, hit } = self;
+        let Intersector { world, cache, pin, builder, stacks } = tracer;
+        let mesh = world.mesh(id);
+        let table = cache.table(id);
+        let visit = pin.visit();
+        let prefetch = |slot| visit.prefetch(visit.root(table, SlotId(slot)));
+        mesh.top().closest(kernel, ray, &mut stacks.mesh, prefetch, |leaf, t_max| {
+            let of = PatchContext { mesh, patch: mesh.patch_of_leaf(leaf.patch) };
+            let slot = visit.root(table, SlotId(leaf.slot));
+            let root = builder.fetch_root(&visit, slot, of, || cache.touch(id, leaf.slot));
+            closest_in_patch(kernel, builder, &visit, root, of, ray, hit);
+            *t_max = hit.t;
+        });
+    }
+}
+
+#[inline(always)]
+fn closest_in_patch<K: Kernel>(
+    kernel: K,
+    builder: &mut Builder,
+    visit: &Visit<'_>,
+    root: Block<'_>,
+    of: PatchContext<'_>,
+    ray: &LatticeRay,
+    hit: &mut LatticeHit,
+) {
+    if !is_node(root.bytes()) {
+        PieceView::new(root.bytes()).closest(kernel, ray, of.patch, hit);
+        return;
+    }
+    let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
+    levels[0] = Some(Level::new(kernel, root, ray, hit.t));
+    let mut depth = 0;
+    while let Some(level) = &mut levels[depth] {
+        let Some(lane) = level.hits.pop_nearest(hit.t) else {
+            if depth == 0 {
+                break;
+            }
+            depth -= 1;
+            continue;
+        };
+        let (slot, cells) = level.child(lane);
+        let block = builder.fetch(visit, slot, of, cells);
+        if is_node(block.bytes()) {
+            depth += 1;
+            levels[depth] = Some(Level::new(kernel, block, ray, hit.t));
+        } else {
+            PieceView::new(block.bytes()).closest(kernel, ray, of.patch, hit);
+        }
+    }
+}
+
+struct OccludedInMesh<'a, 'w> {
+    tracer: &'a mut Intersector<'w>,
+    mesh: MeshId,
+    ray: &'a LatticeRay,
+}
+
+impl Task for OccludedInMesh<'_, '_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> bool {
+        let Self { tracer, mesh: id, ray } = self;
+        let Intersector { world, cache, pin, builder, stacks } = tracer;
+        let mesh = world.mesh(id);
+        let table = cache.table(id);
+        let visit = pin.visit();
+        let prefetch = |slot| visit.prefetch(visit.root(table, SlotId(slot)));
+        mesh.top().occluded(kernel, ray, &mut stacks.mesh, prefetch, |leaf| {
+            let of = PatchContext { mesh, patch: mesh.patch_of_leaf(leaf.patch) };
+            let slot = visit.root(table, SlotId(leaf.slot));
+            let root = builder.fetch_root(&visit, slot, of, || cache.touch(id, leaf.slot));
+            occluded_in_patch(kernel, builder, &visit, root, of, ray)
+        })
+    }
+}
+
+#[inline(always)]
+fn occluded_in_patch<K: Kernel>(
+    kernel: K,
+    builder: &mut Builder,
+    visit: &Visit<'_>,
+    root: Block<'_>,
+    of: PatchContext<'_>,
+    ray: &LatticeRay,
+) -> bool {
+    if !is_node(root.bytes()) {
+        return PieceView::new(root.bytes()).occluded(kernel, ray, of.patch);
+    }
+    let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
+    levels[0] = Some(Level::new(kernel, root, ray, ray.t_max()));
+    let mut depth = 0;
+    while let Some(level) = &mut levels[depth] {
+        let Some(lane) = level.hits.pop() else {
+            if depth == 0 {
+                break;
+            }
+            depth -= 1;
+            continue;
+        };
+        let (slot, cells) = level.child(lane);
+        let block = builder.fetch(visit, slot, of, cells);
+        if is_node(block.bytes()) {
+            depth += 1;
+            levels[depth] = Some(Level::new(kernel, block, ray, ray.t_max()));
+        } else if PieceView::new(block.bytes()).occluded(kernel, ray, of.patch) {
+            return true;
+        }
+    }
+    false
+}
+
+impl<'w> Intersector<'w> {
+    /// A tracer for one thread.
+    pub fn new(world: &'w World, cache: &'w GridCache) -> Self {
+        let pin = cache.segments().pin();
+        Self { world, cache, pin, builder: Builder::default(), stacks: Stacks::default() }
+    }
+
+    /// The world that is traced.
+    pub fn world(&self) -> &'w World {
+        self.world
+    }
+
+    /// Blocks this tracer has built.
+    pub fn n_built(&self) -> u64 {
+        self.builder.n_built
+    }
+
+    /// Scratch for evaluating the surface itself.
+    pub(super) fn dicer(&mut self) -> &mut Dicer {
+        &mut self.builder.dicer
+    }
+
+    /// The ray as the mesh's lattice sees it. `t` keeps its meaning.
+    fn lattice_ray(&self, mesh: MeshId, ray: &Ray, t_max: f32) -> LatticeRay {
+        let to = self.world.mesh(mesh).lattice_from_world();
+        let skip = match ray.from {
+            Some(from) if from.mesh == mesh => triangle_id(self.world, &from),
+            _ => TriangleId::NONE,
+        };
+        LatticeRay::new(to.transform_point3(ray.origin), to.transform_vector3(ray.direction), t_max, skip)
+    }
+
+    fn closest_in_mesh(&mut self, mesh: MeshId, ray: &Ray, best: &mut Option<Hit>) {
+        let t_max = best.map_or(ray.t_max, |hit| hit.t);
+        let lattice_ray = self.lattice_ray(mesh, ray, t_max);
+        let mut found = LatticeHit::none(lattice_ray.t_max());
+        simd::run(ClosestInMesh { tracer: self, mesh, ray: &lattice_ray, hit: &mut found });
+        if found.is_some() {
+            let t = lattice_ray.caller_t(found.t);
+            if best.is_none_or(|b| t < b.t || (t == b.t && mesh < b.primitive.mesh)) {
+                *best = Some(self.hit(mesh, t, &found));
+            }
+        }
+    }
+
+    /// The ray in the space of the tree over meshes; its `t` is only good for the order of visits.
+    fn scene_ray(&self, ray: &Ray) -> LatticeRay {
+        let to = self.world.scene_from_world();
+        let (origin, direction) = (to.transform_point3(ray.origin), to.transform_vector3(ray.direction));
+        LatticeRay::new(origin, direction, f32::INFINITY, TriangleId::NONE)
+    }
+
+    fn hit(&self, id: MeshId, t: f32, found: &LatticeHit) -> Hit {
+        let mesh = self.world.mesh(id);
+        let patch = found.triangle.patch();
+        let rates = mesh.patch_rates(patch);
+        let [u, v] = found.in_cells();
+        let (face, sub) = mesh.surface().face_of(patch);
+        Hit {
+            t,
+            primitive: PrimitiveRef {
+                mesh: id,
+                patch,
+                cell: found.triangle.j() * rates.n_u + found.triangle.i(),
+                half: found.triangle.half() as u8,
+            },
+            face,
+            sub,
+            u: u / rates.n_u as f32,
+            v: v / rates.n_v as f32,
+            normal_in_object: normal_in_object(found.normal, mesh.surface().lattice().step),
+        }
+    }
+}
+
+/// Lattice normals have the size of a cell's area in steps, object normals that in object units.
+fn normal_in_object(normal: Vec3, step: f64) -> Vec3 {
+    (normal.as_dvec3() * step * step).as_vec3()
+}
+
+fn triangle_id(world: &World, of: &PrimitiveRef) -> TriangleId {
+    let n_u = world.mesh(of.mesh).patch_rates(of.patch).n_u;
+    TriangleId::new(of.patch, of.cell % n_u, of.cell / n_u, u32::from(of.half))
+}
+
+impl Intersect for Intersector<'_> {
+    fn closest(&mut self, ray: &Ray) -> Option<Hit> {
+        let mut best = None;
+        if self.world.meshes().len() == 1 {
+            self.closest_in_mesh(MeshId(0), ray, &mut best);
+            return best;
+        }
+        let scene_ray = self.scene_ray(ray);
+        let world = self.world;
+        let mut stack = std::mem::take(&mut self.stacks.scene);
+        world.top().closest(simd::Portable, &scene_ray, &mut stack, |_| (), |leaf, _| {
+            self.closest_in_mesh(MeshId(leaf.patch.0), ray, &mut best);
+        });
+        self.stacks.scene = stack;
+        best
+    }
+
+    fn occluded(&mut self, ray: &Ray) -> bool {
+        let occluded_by = |tracer: &mut Self, mesh: MeshId| {
+            let lattice_ray = tracer.lattice_ray(mesh, ray, ray.t_max);
+            simd::run(OccludedInMesh { tracer, mesh, ray: &lattice_ray })
+        };
+        if self.world.meshes().len() == 1 {
+            return occluded_by(self, MeshId(0));
+        }
+        let scene_ray = self.scene_ray(ray);
+        let world = self.world;
+        let mut stack = std::mem::take(&mut self.stacks.scene);
+        let hit = world.top().occluded(simd::Portable, &scene_ray, &mut stack, |_| (), |leaf| {
+            occluded_by(self, MeshId(leaf.patch.0))
+        });
+        self.stacks.scene = stack;
+        hit
+    }
+}

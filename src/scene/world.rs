@@ -1,0 +1,360 @@
+//! Everything about the scene's geometry that stays the same during a render.
+
+use super::accel::TopLevel;
+use super::description::MeshDescription;
+use super::rate::DicingRate;
+use crate::cache::{CacheConfig, SegmentCache, SlotTable};
+use crate::error::{Error, Result};
+use crate::grid::MAX_CELLS;
+use crate::ids::{MeshId, PatchId};
+use crate::math::{Bounds, DBounds};
+use crate::mesh::{ControlMesh, TexCoords};
+use crate::subdiv::dice::LATTICE_SHIFT;
+use crate::subdiv::{Dicer, PatchRates, Surface};
+use glam::{DAffine3, DMat3, DVec3};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+
+/// Quarters of an irregular patch that its box looks into: more make the box tighter, and building slower.
+const BOX_DEPTH: u32 = 3;
+
+/// Patches whose boxes one thread computes before it asks for more.
+const PATCHES_PER_TASK: usize = 4096;
+
+/// The meshes of a scene, ready to be traced.
+#[derive(Debug)]
+pub struct World {
+    meshes: Vec<WorldMesh>,
+    /// Over the meshes' boxes, in the space that `scene_from_world` leads to.
+    top: TopLevel,
+    scene_from_world: DAffine3,
+}
+
+/// One mesh: surface, tree, and where it stands.
+#[derive(Debug)]
+pub struct WorldMesh {
+    surface: Surface,
+    top: TopLevel,
+    /// The patch of each leaf of `top`, if some patches are hidden.
+    visible: Option<Vec<PatchId>>,
+    tex_coords: Option<TexCoords>,
+    world_from_object: DAffine3,
+    lattice_from_world: DAffine3,
+    /// Takes normals of object space to world space, whatever the transform mirrors.
+    world_from_object_normal: DMat3,
+    rate: DicingRate,
+    bounds_in_world: DBounds,
+}
+
+/// What the full tessellation would take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FullTessellation {
+    /// Patches with a surface.
+    pub patches: u64,
+    /// Triangles.
+    pub triangles: u64,
+    /// Pieces of at most 8 x 8 cells.
+    pub pieces: u64,
+    /// Bytes of pieces and nodes, at the middle vertex format.
+    pub bytes: u64,
+}
+
+impl World {
+    /// A world of these meshes.
+    pub fn new(meshes: Vec<WorldMesh>) -> Self {
+        let bounds = meshes.iter().map(|m| m.bounds_in_world).filter(|b| !b.is_empty());
+        let all = bounds.fold(DBounds::EMPTY, DBounds::union);
+        let scene_from_world = scene_space(all);
+        let boxes: Vec<Bounds> = meshes.iter().map(|m| scene_box(scene_from_world, m.bounds_in_world)).collect();
+        Self { top: TopLevel::build(&boxes), meshes, scene_from_world }
+    }
+
+    /// The meshes, by [`MeshId`].
+    pub fn meshes(&self) -> &[WorldMesh] {
+        &self.meshes
+    }
+
+    /// One mesh.
+    #[inline]
+    pub fn mesh(&self, id: MeshId) -> &WorldMesh {
+        &self.meshes[id.idx()]
+    }
+
+    pub(super) fn top(&self) -> &TopLevel {
+        &self.top
+    }
+
+    pub(super) fn scene_from_world(&self) -> &DAffine3 {
+        &self.scene_from_world
+    }
+
+    /// Bytes held by meshes, plans and trees.
+    pub fn bytes(&self) -> usize {
+        self.top.bytes() + self.meshes.iter().map(WorldMesh::bytes).sum::<usize>()
+    }
+
+    /// Patches with a surface, of all meshes.
+    pub fn n_patches(&self) -> usize {
+        self.meshes.iter().map(WorldMesh::n_leaves).sum()
+    }
+
+    /// Triangles and bytes if every patch were tessellated.
+    pub fn full_tessellation(&self, n_threads: usize) -> FullTessellation {
+        self.meshes.iter().map(|m| m.full_tessellation(n_threads)).fold(FullTessellation::default(), |a, b| {
+            FullTessellation {
+                patches: a.patches + b.patches,
+                triangles: a.triangles + b.triangles,
+                pieces: a.pieces + b.pieces,
+                bytes: a.bytes + b.bytes,
+            }
+        })
+    }
+}
+
+/// A space in which the world's box is a cube of 2^22 about the origin: what trees are built in.
+fn scene_space(all: DBounds) -> DAffine3 {
+    if all.is_empty() {
+        return DAffine3::IDENTITY;
+    }
+    let half = (0.5 * (all.max - all.min)).max_element().max(f64::MIN_POSITIVE);
+    let scale = 2f64.powi(22 - half.log2().ceil() as i32);
+    DAffine3::from_scale(DVec3::splat(scale)) * DAffine3::from_translation(-all.center())
+}
+
+/// The box in scene space, rounded outwards to integers.
+fn scene_box(scene_from_world: DAffine3, b: DBounds) -> Bounds {
+    if b.is_empty() {
+        return Bounds { min: glam::Vec3::ZERO, max: glam::Vec3::ZERO };
+    }
+    let (min, max) = (scene_from_world.transform_point3(b.min), scene_from_world.transform_point3(b.max));
+    Bounds { min: (min - 1.0).floor().as_vec3(), max: (max + 1.0).ceil().as_vec3() }
+}
+
+impl WorldMesh {
+    /// Prepares a mesh for tracing on `n_threads` threads: plans, boxes and tree, but no grid.
+    pub fn new(
+        mesh: ControlMesh,
+        world_from_object: DAffine3,
+        rate: DicingRate,
+        n_threads: usize,
+    ) -> Result<Self> {
+        let surface = Surface::new(&mesh, n_threads)?;
+        let tex_coords = mesh.tex_coords;
+        let patches: Vec<PatchId> = surface.visible_patches().collect();
+        let boxes = patch_boxes(&surface, &patches, n_threads);
+        let lattice = surface.lattice();
+        let object_from_world = world_from_object.inverse();
+        let lattice_from_object = DAffine3::from_translation(DVec3::splat(LATTICE_SHIFT))
+            * DAffine3::from_scale(DVec3::splat(lattice.step.recip()))
+            * DAffine3::from_translation(-lattice.center);
+        let linear = world_from_object.matrix3;
+        let bounds = boxes.iter().fold(Bounds::EMPTY, |a, b| a.union(*b));
+        let bounds_in_world = world_box(&surface, world_from_object, bounds);
+        let top = TopLevel::build(&boxes);
+        let visible = (patches.len() != surface.n_patches()).then_some(patches);
+        Ok(Self {
+            top,
+            visible,
+            tex_coords,
+            world_from_object,
+            lattice_from_world: lattice_from_object * object_from_world,
+            world_from_object_normal: linear.inverse().transpose() * linear.determinant().signum(),
+            rate,
+            bounds_in_world,
+            surface,
+        })
+    }
+
+    /// As [`new`](Self::new), for a mesh of a scene file that has been read.
+    pub fn from_description(
+        description: &MeshDescription,
+        mesh: ControlMesh,
+        rate: DicingRate,
+        n_threads: usize,
+    ) -> Result<Self> {
+        Self::new(mesh, description.world_from_object, rate, n_threads)
+            .map_err(|e| Error::input(format!("{}: {e}", description.file.display())))
+    }
+
+    /// The limit surface.
+    pub fn surface(&self) -> &Surface {
+        &self.surface
+    }
+
+    /// Texture coordinates, if the mesh has them.
+    pub fn tex_coords(&self) -> Option<&TexCoords> {
+        self.tex_coords.as_ref()
+    }
+
+    pub(super) fn top(&self) -> &TopLevel {
+        &self.top
+    }
+
+    /// Where the mesh stands.
+    pub fn world_from_object(&self) -> &DAffine3 {
+        &self.world_from_object
+    }
+
+    pub(super) fn lattice_from_world(&self) -> &DAffine3 {
+        &self.lattice_from_world
+    }
+
+    pub(super) fn world_from_object_normal(&self) -> &DMat3 {
+        &self.world_from_object_normal
+    }
+
+    /// Bounds of the limit surface in world space; empty if there is none.
+    pub fn bounds_in_world(&self) -> DBounds {
+        self.bounds_in_world
+    }
+
+    /// Patches with a surface.
+    pub fn n_leaves(&self) -> usize {
+        self.visible.as_ref().map_or(self.surface.n_patches(), Vec::len)
+    }
+
+    /// The patch of a leaf of the tree.
+    #[inline(always)]
+    pub(super) fn patch_of_leaf(&self, leaf: PatchId) -> PatchId {
+        self.visible.as_ref().map_or(leaf, |ids| ids[leaf.idx()])
+    }
+
+    /// How finely a patch is diced.
+    pub fn patch_rates(&self, patch: PatchId) -> PatchRates {
+        let world = |p: DVec3| self.world_from_object.transform_point3(p);
+        self.surface.patch_rates(patch, &|a, b| self.rate.edge_rate(world(a), world(b)))
+    }
+
+    fn bytes(&self) -> usize {
+        let tex_coords = self.tex_coords.as_ref().map_or(0, |t| 8 * t.values.len() + 4 * t.indices.len());
+        let visible = self.visible.as_ref().map_or(0, |v| 4 * v.len());
+        self.surface.bytes() + self.top.bytes() + tex_coords + visible
+    }
+
+    fn full_tessellation(&self, n_threads: usize) -> FullTessellation {
+        let (triangles, pieces, bytes) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
+        in_parallel(self.n_leaves(), n_threads, |range| {
+            let mut sum = [0; 3];
+            for leaf in range {
+                let rates = self.patch_rates(self.patch_of_leaf(PatchId::from(leaf)));
+                let n_pieces = u64::from(rates.n_u.div_ceil(8)) * u64::from(rates.n_v.div_ceil(8));
+                sum[0] += rates.n_triangles();
+                sum[1] += n_pieces;
+                sum[2] += full_bytes(&rates, n_pieces);
+            }
+            for (total, part) in [&triangles, &pieces, &bytes].into_iter().zip(sum) {
+                total.fetch_add(part, Ordering::Relaxed);
+            }
+        });
+        FullTessellation {
+            patches: self.n_leaves() as u64,
+            triangles: triangles.into_inner(),
+            pieces: pieces.into_inner(),
+            bytes: bytes.into_inner(),
+        }
+    }
+}
+
+/// Bytes of a patch's pieces, three bytes a coordinate, and of the nodes above them.
+fn full_bytes(rates: &PatchRates, n_pieces: u64) -> u64 {
+    let (n_u, n_v) = (u64::from(rates.n_u), u64::from(rates.n_v));
+    let columns = |n: u64| n + n.div_ceil(MAX_CELLS as u64);
+    let vertices = 9 * columns(n_u) * columns(n_v);
+    let nodes = if n_pieces > 1 { 256 * n_pieces.div_ceil(15) } else { 0 };
+    vertices + 160 * n_pieces + nodes
+}
+
+/// Calls `work` with ranges that together are `0..n`, on `n_threads` threads.
+pub(super) fn in_parallel(n: usize, n_threads: usize, work: impl Fn(std::ops::Range<usize>) + Sync) {
+    let next = AtomicUsize::new(0);
+    let worker = || loop {
+        let start = next.fetch_add(PATCHES_PER_TASK, Ordering::Relaxed);
+        if start >= n {
+            break;
+        }
+        work(start..(start + PATCHES_PER_TASK).min(n));
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..n_threads.min(n.div_ceil(PATCHES_PER_TASK)) {
+            scope.spawn(worker);
+        }
+        worker();
+    });
+}
+
+fn patch_boxes(surface: &Surface, patches: &[PatchId], n_threads: usize) -> Vec<Bounds> {
+    let mut boxes = vec![Bounds::EMPTY; patches.len()];
+    let chunks: Vec<_> = boxes.chunks_mut(PATCHES_PER_TASK).map(parking_lot::Mutex::new).collect();
+    in_parallel(patches.len(), n_threads, |range| {
+        let mut dicer = Dicer::default();
+        let mut chunk = chunks[range.start / PATCHES_PER_TASK].lock();
+        for (b, patch) in chunk.iter_mut().zip(&patches[range]) {
+            *b = dicer.patch_bounds(surface, *patch, BOX_DEPTH);
+        }
+    });
+    drop(chunks);
+    boxes
+}
+
+/// The world-space box of a box in lattice units.
+fn world_box(surface: &Surface, world_from_object: DAffine3, b: Bounds) -> DBounds {
+    if b.is_empty() {
+        return DBounds::EMPTY;
+    }
+    let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
+    let corner = |k: u32| {
+        let pick = |axis: u32, a: f64, b: f64| if (k >> axis) & 1 == 0 { a } else { b };
+        let p = DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z));
+        world_from_object.transform_point3(surface.object_from_lattice(p))
+    };
+    (0..8).map(corner).collect()
+}
+
+/// The cache of a world's grids: one slot for each leaf of each mesh's tree.
+#[derive(Debug)]
+pub struct GridCache {
+    segments: SegmentCache,
+    tables: Vec<SlotTable>,
+    /// A bit per leaf slot, set when its patch is first asked for.
+    touched: Vec<Box<[AtomicU64]>>,
+}
+
+impl GridCache {
+    /// An empty cache for `world`.
+    pub fn new(world: &World, config: CacheConfig) -> Result<Self> {
+        let segments = SegmentCache::new(config)?;
+        let n_slots = || world.meshes.iter().map(|m| m.top.n_slots());
+        let tables = n_slots().map(|n| segments.table(n)).collect();
+        let bits = |n: usize| (0..n.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
+        Ok(Self { tables, touched: n_slots().map(bits).collect(), segments })
+    }
+
+    /// The memory and its counters.
+    pub fn segments(&self) -> &SegmentCache {
+        &self.segments
+    }
+
+    #[inline(always)]
+    pub(super) fn table(&self, mesh: MeshId) -> &SlotTable {
+        &self.tables[mesh.idx()]
+    }
+
+    /// Notes that a leaf's patch was asked for.
+    pub(super) fn touch(&self, mesh: MeshId, slot: u32) {
+        let word = &self.touched[mesh.idx()][slot as usize / 64];
+        let bit = 1 << (slot % 64);
+        if word.load(Ordering::Relaxed) & bit == 0 {
+            word.fetch_or(bit, Ordering::Relaxed);
+        }
+    }
+
+    /// Patches that some ray asked for.
+    pub fn patches_touched(&self) -> u64 {
+        let words = self.touched.iter().flatten();
+        words.map(|w| u64::from(w.load(Ordering::Relaxed).count_ones())).sum()
+    }
+
+    /// Bytes of slots and marks, the arena not included.
+    pub fn table_bytes(&self) -> usize {
+        self.tables.iter().map(SlotTable::bytes).sum::<usize>() + self.touched.iter().map(|t| 8 * t.len()).sum::<usize>()
+    }
+}
