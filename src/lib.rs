@@ -16,6 +16,7 @@
 //! Modules in reading order: [`mesh`], [`topology`], [`subdiv`], [`grid`], [`cache`], [`scene`], [`render`],
 //! [`image`], [`report`], [`io`], [`cli`].
 
+pub mod bench;
 pub mod cache;
 pub mod cli;
 pub mod error;

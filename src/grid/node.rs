@@ -9,6 +9,9 @@ use glam::Vec3;
 /// Exact size of a node, without the words that the cache puts before it.
 pub const NODE_BYTES: usize = HEAD_BYTES;
 
+/// In place of a vertex format: a node has no vertices.
+const NO_FORMAT: u8 = 0;
+
 /// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `bounds` has one box in lattice units
 /// for each, u fastest; it must hold every lattice vertex of the child. `out` is [`NODE_BYTES`] long.
 #[inline]
@@ -21,7 +24,7 @@ pub fn encode_node(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &
     for (c, b) in bounds.iter().enumerate() {
         boxes[4 * (c / n_u) + c % n_u] = integer_box(b);
     }
-    let head = Head::new(whole, &boxes, children, cells, 0);
+    let head = Head::new(whole, &boxes, children, cells, NO_FORMAT);
     out.copy_from_slice(bytemuck::bytes_of(&head));
 }
 
@@ -30,6 +33,12 @@ pub fn encode_node(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &
 fn integer_box(b: &Bounds) -> IntegerBox {
     let inside = |p: Vec3| p.clamp(Vec3::splat(-LATTICE_LIMIT), Vec3::splat(LATTICE_LIMIT)).as_ivec3().to_array();
     [inside(b.min.floor()), inside(b.max.ceil())]
+}
+
+/// Whether a block is a node; else it is a piece. The block is as for [`NodeView::new`].
+#[inline(always)]
+pub fn is_node(block: &[u8]) -> bool {
+    NodeView::new(block).head.format == NO_FORMAT
 }
 
 /// A node to be read.

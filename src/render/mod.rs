@@ -23,6 +23,7 @@
 mod analytic;
 pub mod film;
 pub mod integrators;
+mod lazy;
 pub mod rays;
 pub mod sampler;
 pub mod settings;

@@ -14,8 +14,8 @@ use crate::grid::{
 use crate::ids::{MeshId, PatchId};
 use crate::math::simd::{self, Kernel, Task};
 use crate::math::{Bounds, Hit, Intersect, PrimitiveRef, Ray};
-use crate::subdiv::{Dicer, PatchRates};
-use glam::Vec3;
+use crate::subdiv::{Dicer, PatchRates, Surface};
+use glam::{DVec3, Vec3};
 
 /// Children of a node along u and v.
 const NODE_SIDE: u32 = 4;
@@ -29,6 +29,7 @@ pub struct Intersector<'w> {
     cache: &'w GridCache,
     pin: Pin<'w>,
     builder: Builder,
+    shading: NormalScratch,
     stacks: Stacks,
 }
 
@@ -38,7 +39,25 @@ struct Builder {
     dicer: Dicer,
     vertices: Vec<[i32; 3]>,
     boxes: Vec<Bounds>,
+    /// The mesh that `dicer` remembers a patch of.
+    mesh: Option<MeshId>,
     n_built: u64,
+}
+
+/// Evaluates normals; remembers the last patch, which shading asks about again and again.
+#[derive(Default)]
+struct NormalScratch {
+    dicer: Dicer,
+    mesh: Option<MeshId>,
+}
+
+impl NormalScratch {
+    fn normal(&mut self, surface: &Surface, mesh: MeshId, patch: PatchId, u: f64, v: f64) -> DVec3 {
+        if self.mesh.replace(mesh) != Some(mesh) {
+            self.dicer.forget();
+        }
+        self.dicer.normal(surface, patch, u, v)
+    }
 }
 
 #[derive(Default)]
@@ -50,6 +69,7 @@ struct Stacks {
 /// A patch about to be traversed.
 #[derive(Clone, Copy)]
 struct PatchContext<'a> {
+    id: MeshId,
     mesh: &'a WorldMesh,
     patch: PatchId,
 }
@@ -93,13 +113,17 @@ impl Builder {
             Claim::Build(ticket) => ticket,
         };
         self.n_built += 1;
+        if self.mesh.replace(of.id) != Some(of.id) {
+            self.dicer.forget();
+        }
         let rates = of.mesh.patch_rates(of.patch);
         let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
         if cells.size().iter().all(|&n| n <= MAX_CELLS) {
             self.dicer.dice(of.mesh.surface(), of.patch, &rates, i, j, &mut self.vertices);
             let layout = PieceLayout::new(&self.vertices, cells);
             let vertices = &self.vertices;
-            return ticket.publish(BlockLayout { bytes: layout.bytes(), children: 0 }, |out| layout.encode(vertices, out));
+            return ticket
+                .publish(BlockLayout { bytes: layout.bytes(), children: 0 }, |out| layout.encode(vertices, out));
         }
         let children = self.child_boxes(of, &rates, cells);
         let n_slots = (NODE_SIDE * u32::from(children[1] - 1)) as usize + usize::from(children[0]);
@@ -186,13 +210,13 @@ impl Task for ClosestInMesh<'_, '_> {
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) {
         let Self { tracer, mesh: id, ray, hit } = self;
-        let Intersector { world, cache, pin, builder, stacks } = tracer;
+        let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
         let table = cache.table(id);
         let visit = pin.visit();
         let prefetch = |slot| visit.prefetch(visit.root(table, SlotId(slot)));
         mesh.top().closest(kernel, ray, &mut stacks.mesh, prefetch, |leaf, t_max| {
-            let of = PatchContext { mesh, patch: mesh.patch_of_leaf(leaf.patch) };
+            let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
             let root = builder.fetch_root(&visit, slot, of, || cache.touch(id, leaf.slot));
             closest_in_patch(kernel, builder, &visit, root, of, ray, hit);
@@ -249,13 +273,13 @@ impl Task for OccludedInMesh<'_, '_> {
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> bool {
         let Self { tracer, mesh: id, ray } = self;
-        let Intersector { world, cache, pin, builder, stacks } = tracer;
+        let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
         let table = cache.table(id);
         let visit = pin.visit();
         let prefetch = |slot| visit.prefetch(visit.root(table, SlotId(slot)));
         mesh.top().occluded(kernel, ray, &mut stacks.mesh, prefetch, |leaf| {
-            let of = PatchContext { mesh, patch: mesh.patch_of_leaf(leaf.patch) };
+            let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
             let root = builder.fetch_root(&visit, slot, of, || cache.touch(id, leaf.slot));
             occluded_in_patch(kernel, builder, &visit, root, of, ray)
@@ -302,7 +326,14 @@ impl<'w> Intersector<'w> {
     /// A tracer for one thread.
     pub fn new(world: &'w World, cache: &'w GridCache) -> Self {
         let pin = cache.segments().pin();
-        Self { world, cache, pin, builder: Builder::default(), stacks: Stacks::default() }
+        Self {
+            world,
+            cache,
+            pin,
+            builder: Builder::default(),
+            shading: NormalScratch::default(),
+            stacks: Stacks::default(),
+        }
     }
 
     /// The world that is traced.
@@ -315,9 +346,10 @@ impl<'w> Intersector<'w> {
         self.builder.n_built
     }
 
-    /// Scratch for evaluating the surface itself.
-    pub(super) fn dicer(&mut self) -> &mut Dicer {
-        &mut self.builder.dicer
+    /// The limit surface's normal at a hit, in object space, along du x dv and not normalised; zero where there is none.
+    pub fn limit_normal(&mut self, hit: &Hit) -> DVec3 {
+        let surface = self.world.mesh(hit.primitive.mesh).surface();
+        self.shading.normal(surface, hit.primitive.mesh, hit.primitive.patch, f64::from(hit.u), f64::from(hit.v))
     }
 
     /// The ray as the mesh's lattice sees it. `t` keeps its meaning.
@@ -393,9 +425,15 @@ impl Intersect for Intersector<'_> {
         let scene_ray = self.scene_ray(ray);
         let world = self.world;
         let mut stack = std::mem::take(&mut self.stacks.scene);
-        world.top().closest(simd::Portable, &scene_ray, &mut stack, |_| (), |leaf, _| {
-            self.closest_in_mesh(MeshId(leaf.patch.0), ray, &mut best);
-        });
+        world.top().closest(
+            simd::Portable,
+            &scene_ray,
+            &mut stack,
+            |_| (),
+            |leaf, _| {
+                self.closest_in_mesh(MeshId(leaf.patch.0), ray, &mut best);
+            },
+        );
         self.stacks.scene = stack;
         best
     }
@@ -411,9 +449,13 @@ impl Intersect for Intersector<'_> {
         let scene_ray = self.scene_ray(ray);
         let world = self.world;
         let mut stack = std::mem::take(&mut self.stacks.scene);
-        let hit = world.top().occluded(simd::Portable, &scene_ray, &mut stack, |_| (), |leaf| {
-            occluded_by(self, MeshId(leaf.patch.0))
-        });
+        let hit = world.top().occluded(
+            simd::Portable,
+            &scene_ray,
+            &mut stack,
+            |_| (),
+            |leaf| occluded_by(self, MeshId(leaf.patch.0)),
+        );
         self.stacks.scene = stack;
         hit
     }

@@ -4,7 +4,11 @@
 
 pub mod accel;
 pub mod camera;
+pub mod compile;
 pub mod description;
+pub mod intersect;
 pub mod light;
 pub mod material;
 pub mod rate;
+pub mod tessellate;
+pub mod world;

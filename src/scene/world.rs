@@ -131,12 +131,7 @@ fn scene_box(scene_from_world: DAffine3, b: DBounds) -> Bounds {
 
 impl WorldMesh {
     /// Prepares a mesh for tracing on `n_threads` threads: plans, boxes and tree, but no grid.
-    pub fn new(
-        mesh: ControlMesh,
-        world_from_object: DAffine3,
-        rate: DicingRate,
-        n_threads: usize,
-    ) -> Result<Self> {
+    pub fn new(mesh: ControlMesh, world_from_object: DAffine3, rate: DicingRate, n_threads: usize) -> Result<Self> {
         let surface = Surface::new(&mesh, n_threads)?;
         let tex_coords = mesh.tex_coords;
         let patches: Vec<PatchId> = surface.visible_patches().collect();
@@ -198,7 +193,8 @@ impl WorldMesh {
         &self.lattice_from_world
     }
 
-    pub(super) fn world_from_object_normal(&self) -> &DMat3 {
+    /// Takes normals of object space to world space, mirrored transforms included; lengths are not kept.
+    pub fn world_from_object_normal(&self) -> &DMat3 {
         &self.world_from_object_normal
     }
 
@@ -310,7 +306,6 @@ fn world_box(surface: &Surface, world_from_object: DAffine3, b: Bounds) -> DBoun
 }
 
 /// The cache of a world's grids: one slot for each leaf of each mesh's tree.
-#[derive(Debug)]
 pub struct GridCache {
     segments: SegmentCache,
     tables: Vec<SlotTable>,
@@ -355,6 +350,7 @@ impl GridCache {
 
     /// Bytes of slots and marks, the arena not included.
     pub fn table_bytes(&self) -> usize {
-        self.tables.iter().map(SlotTable::bytes).sum::<usize>() + self.touched.iter().map(|t| 8 * t.len()).sum::<usize>()
+        self.tables.iter().map(SlotTable::bytes).sum::<usize>()
+            + self.touched.iter().map(|t| 8 * t.len()).sum::<usize>()
     }
 }

@@ -154,6 +154,12 @@ fn snapped(i: u32, n: u32, rate: u32) -> u32 {
 }
 
 impl Dicer {
+    /// Forgets the last patch: call it before turning to another surface.
+    pub fn forget(&mut self) {
+        self.points.forget();
+        self.owner.points.forget();
+    }
+
     /// The lattice vertices `i0..=i1` by `j0..=j1` of a patch's grid, i fastest, appended to a cleared `out`.
     pub fn dice(
         &mut self,

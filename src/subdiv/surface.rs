@@ -85,6 +85,13 @@ impl Default for PatchPoints {
     }
 }
 
+impl PatchPoints {
+    /// Forgets the patch.
+    pub fn forget(&mut self) {
+        self.patch = None;
+    }
+}
+
 impl Surface {
     /// Prepares a mesh, on `n_threads` threads.
     pub fn new(mesh: &ControlMesh, n_threads: usize) -> Result<Self> {
@@ -145,6 +152,11 @@ impl Surface {
     /// Patches that have a surface.
     pub fn visible_patches(&self) -> impl Iterator<Item = PatchId> {
         (0..self.n_patches() as u32).map(PatchId).filter(|&p| self.is_visible(p))
+    }
+
+    /// First corner of a face, counted over all faces, and number of corners.
+    pub fn face_corners(&self, face: FaceId) -> (u32, u32) {
+        self.topology.face_corners(face.0)
     }
 
     /// Number of corners of a face.

@@ -1,0 +1,429 @@
+//! Ray rates by a published recipe, so that they stand beside those of other tracers that follow it.
+//!
+//! ```text
+//! camera      at = centre of the vertices' box, eye = at + 1.35 diag normalize(1, 0.6, 1.2), 35 degrees vertical; or given
+//! primary     through pixel centres, 16 x 16 tiles row by row, one tile a task
+//! AO          samples 0..N-1 at each hit, any hit, 1024 rays a task
+//! diffuse     sample N at each hit, nearest hit, in tile order and once more shuffled
+//! ```
+//!
+//! A secondary ray starts `1e-4 diag` above the hit along the geometric normal and is cosine-distributed about it; its two
+//! random numbers are hashes of (pixel, 2 sample) and (pixel, 2 sample + 1). Rays and results are f32, built before any
+//! clock starts. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of
+//! the threads (`cpu`).
+
+use crate::io::process::thread_cpu;
+use crate::math::{Hit, Intersect, Ray};
+use crate::render::sampler::hash2;
+use crate::scene::camera::Camera;
+use glam::{DVec2, Vec3};
+use parking_lot::Mutex;
+use serde::Serialize;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Side of a tile of primary rays.
+const TILE: u32 = 16;
+/// Secondary rays in a task.
+const CHUNK: usize = 1024;
+
+/// A ray as the recipe stores it.
+#[derive(Clone, Copy, Debug, Default)]
+struct BenchRay {
+    origin: Vec3,
+    direction: Vec3,
+}
+
+impl BenchRay {
+    #[inline]
+    fn ray(&self) -> Ray {
+        Ray::new(self.origin.as_dvec3(), self.direction.as_dvec3())
+    }
+}
+
+/// What a primary ray hit; `t` is infinite for a miss.
+#[derive(Clone, Copy, Debug)]
+pub struct BenchHit {
+    /// Distance.
+    pub t: f32,
+    /// Control face.
+    pub face: u32,
+    /// Parameter of the face, encoded as [`face_parameters`] says.
+    pub u: f32,
+    /// See `u`.
+    pub v: f32,
+    /// Geometric normal, not normalised.
+    pub normal: Vec3,
+}
+
+impl BenchHit {
+    const MISS: Self = Self { t: f32::INFINITY, face: u32::MAX, u: 0.0, v: 0.0, normal: Vec3::ZERO };
+}
+
+/// Million rays a second.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Rate {
+    /// By the median of the passes' wall times.
+    pub median: f64,
+    /// By the shortest pass.
+    pub best: f64,
+    /// By the median of CPU seconds per thread.
+    pub cpu: f64,
+}
+
+/// Rates with one thread and with all.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Rates {
+    /// One thread.
+    pub t1: Rate,
+    /// All threads asked for.
+    #[serde(rename = "tN")]
+    pub tn: Rate,
+}
+
+/// What to run.
+#[derive(Clone, Copy, Debug)]
+pub struct BenchSettings {
+    /// Picture size in pixels.
+    pub size: [u32; 2],
+    /// Threads of the second measurement of each pass.
+    pub threads: usize,
+    /// Occlusion rays per hit.
+    pub ao: u32,
+    /// Passes of each measurement.
+    pub repeat: usize,
+    /// Which passes to run besides the first primary one: primary, AO, diffuse.
+    pub passes: [bool; 3],
+    /// Diagonal of the box of the vertices that faces use.
+    pub diagonal: f64,
+}
+
+/// What was measured.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct BenchResult {
+    /// Primary rays that hit.
+    pub hits: usize,
+    /// Mean distance of hits.
+    pub mean_t: f64,
+    /// Wall seconds of the first, cold pass of primary rays on all threads.
+    pub first_pass_s: f64,
+    /// Primary rays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub primary: Option<Rates>,
+    /// Number of AO rays.
+    pub ao_rays: usize,
+    /// Share of them that is occluded.
+    pub ao_occluded: f64,
+    /// Wall seconds of the first AO pass.
+    pub ao_first_s: f64,
+    /// AO rays.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ao: Option<Rates>,
+    /// Diffuse rays in the order of the pixels' tiles.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffuse_tile_order: Option<Rates>,
+    /// The same rays shuffled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diffuse_shuffled: Option<Rates>,
+    /// Number of diffuse rays.
+    pub diffuse_rays: usize,
+    /// Share of them that hit.
+    pub diffuse_hit: f64,
+}
+
+/// The rays of the recipe and their results.
+pub struct Bench {
+    settings: BenchSettings,
+    primary: Vec<BenchRay>,
+    pixel: Vec<u32>,
+    tile_start: Vec<usize>,
+    hits: Vec<BenchHit>,
+}
+
+/// Face parameters as one number each for faces of any size: a quad's are its own; sub-quad i of a polygon has
+/// `u = 2 (i & 3) + 0.5 + u'`, `v = 2 ((i >> 2) & 3) + 0.5 + v'`.
+pub fn face_parameters(face_size: u32, hit: &Hit) -> [f32; 2] {
+    if face_size == 4 {
+        return [hit.u, hit.v];
+    }
+    let offset = |i: u32| 2.0 * (i & 3) as f32 + 0.5;
+    [offset(hit.sub) + hit.u, offset(hit.sub >> 2) + hit.v]
+}
+
+impl Bench {
+    /// Makes the primary rays and room for their results.
+    pub fn new(camera: &Camera, settings: BenchSettings) -> Self {
+        let [width, height] = settings.size;
+        let mut bench =
+            Self { settings, primary: Vec::new(), pixel: Vec::new(), tile_start: Vec::new(), hits: Vec::new() };
+        for ty in (0..height).step_by(TILE as usize) {
+            for tx in (0..width).step_by(TILE as usize) {
+                bench.tile_start.push(bench.primary.len());
+                for (x, y) in pixels([tx, ty], [width.min(tx + TILE), height.min(ty + TILE)]) {
+                    let center = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                    let ray = camera.ray(center, settings.size);
+                    let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
+                    bench.primary.push(BenchRay { origin, direction });
+                    bench.pixel.push(y * width + x);
+                }
+            }
+        }
+        bench.tile_start.push(bench.primary.len());
+        bench.hits = vec![BenchHit::MISS; bench.primary.len()];
+        bench
+    }
+
+    /// Runs all passes. `make_tracer` is called once for each thread of each pass; `bench_hit` describes a hit.
+    pub fn run<T: Intersect>(
+        &mut self,
+        make_tracer: impl Fn() -> T + Sync,
+        bench_hit: impl Fn(&Hit) -> BenchHit + Sync,
+    ) -> BenchResult {
+        let mut result = BenchResult::default();
+        self.run_primary(&make_tracer, &bench_hit, &mut result);
+        let (ao, mut diffuse) = self.secondary_rays();
+        if self.settings.passes[1] {
+            self.run_ao(&make_tracer, &ao, &mut result);
+        }
+        if self.settings.passes[2] {
+            let rays = &diffuse;
+            let mut hits = vec![0u8; rays.len()];
+            result.diffuse_tile_order = Some(self.run_diffuse(&make_tracer, rays, &mut hits));
+            for i in (2..=diffuse.len()).rev() {
+                diffuse.swap(i - 1, (hash2(i as u32, 77) as usize) % i);
+            }
+            result.diffuse_shuffled = Some(self.run_diffuse(&make_tracer, &diffuse, &mut hits));
+            result.diffuse_rays = diffuse.len();
+            result.diffuse_hit = share(&hits);
+        }
+        result
+    }
+
+    fn run_primary<T: Intersect>(
+        &mut self,
+        make_tracer: &(impl Fn() -> T + Sync),
+        bench_hit: &(impl Fn(&Hit) -> BenchHit + Sync),
+        result: &mut BenchResult,
+    ) {
+        let (primary, starts, settings) = (&self.primary, &self.tile_start, self.settings);
+        let mut tiles: Vec<_> = split(&mut self.hits, starts);
+        let mut pass = |threads| {
+            parallel(threads, make_tracer, &mut tiles, |tracer, tile, hits| {
+                for (ray, hit) in primary[starts[tile]..starts[tile + 1]].iter().zip(hits.iter_mut()) {
+                    *hit = tracer.closest(&ray.ray()).map_or(BenchHit::MISS, |h| bench_hit(&h));
+                }
+            })
+        };
+        result.first_pass_s = pass(settings.threads).0;
+        if settings.passes[0] {
+            result.primary = Some(measure(&settings, primary.len(), &mut pass));
+        }
+        let hits = self.hits.iter().filter(|h| h.t < f32::INFINITY);
+        let (n, sum) = hits.fold((0, 0.0), |(n, sum), h| (n + 1, sum + f64::from(h.t)));
+        result.hits = n;
+        result.mean_t = if n > 0 { sum / n as f64 } else { 0.0 };
+    }
+
+    fn run_ao<T: Intersect>(&self, make_tracer: &(impl Fn() -> T + Sync), rays: &[BenchRay], result: &mut BenchResult) {
+        let mut occluded = vec![0u8; rays.len()];
+        let mut chunks: Vec<&mut [u8]> = occluded.chunks_mut(CHUNK).collect();
+        let mut pass = |threads| {
+            parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
+                for (ray, out) in rays[chunk * CHUNK..].iter().zip(out.iter_mut()) {
+                    *out = u8::from(tracer.occluded(&ray.ray()));
+                }
+            })
+        };
+        result.ao_first_s = pass(self.settings.threads).0;
+        result.ao = Some(measure(&self.settings, rays.len(), &mut pass));
+        result.ao_rays = rays.len();
+        result.ao_occluded = share(&occluded);
+    }
+
+    fn run_diffuse<T: Intersect>(
+        &self,
+        make_tracer: &(impl Fn() -> T + Sync),
+        rays: &[BenchRay],
+        hits: &mut [u8],
+    ) -> Rates {
+        let mut chunks: Vec<&mut [u8]> = hits.chunks_mut(CHUNK).collect();
+        measure(&self.settings, rays.len(), &mut |threads| {
+            parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
+                for (ray, out) in rays[chunk * CHUNK..].iter().zip(out.iter_mut()) {
+                    *out = u8::from(tracer.closest(&ray.ray()).is_some());
+                }
+            })
+        })
+    }
+
+    /// AO and diffuse rays from the primary hits.
+    fn secondary_rays(&self) -> (Vec<BenchRay>, Vec<BenchRay>) {
+        let n_ao = if self.settings.passes[1] { self.settings.ao } else { 0 };
+        let offset = (1e-4 * self.settings.diagonal) as f32;
+        let (mut ao, mut diffuse) = (Vec::new(), Vec::new());
+        for ((ray, hit), &pixel) in self.primary.iter().zip(&self.hits).zip(&self.pixel) {
+            if hit.t == f32::INFINITY {
+                continue;
+            }
+            let length = hit.normal.length();
+            let sign = if hit.normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
+            let normal = hit.normal * (sign / length);
+            let origin = ray.origin + hit.t * ray.direction + offset * normal;
+            let along = |sample: u32| {
+                let direction = cosine_direction(normal, uniform(pixel, 2 * sample), uniform(pixel, 2 * sample + 1));
+                BenchRay { origin, direction }
+            };
+            ao.extend((0..n_ao).map(along));
+            diffuse.push(along(self.settings.ao));
+        }
+        (ao, diffuse)
+    }
+
+    /// The primary hits as bytes: row by row, seven little-endian f32 a pixel: t, face, u, v, normal; a miss is
+    /// (infinity, -1, 0, 0, 0, 0, 0).
+    pub fn hit_bytes(&self) -> Vec<u8> {
+        let mut image = vec![0u8; self.hits.len() * 28];
+        for (hit, &pixel) in self.hits.iter().zip(&self.pixel) {
+            let face = if hit.t == f32::INFINITY { -1.0 } else { hit.face as f32 };
+            let values = [hit.t, face, hit.u, hit.v, hit.normal.x, hit.normal.y, hit.normal.z];
+            let out = image[pixel as usize * 28..][..28].chunks_exact_mut(4);
+            out.zip(values).for_each(|(out, value)| out.copy_from_slice(&value.to_le_bytes()));
+        }
+        image
+    }
+}
+
+fn pixels(from: [u32; 2], to: [u32; 2]) -> impl Iterator<Item = (u32, u32)> {
+    (from[1]..to[1]).flat_map(move |y| (from[0]..to[0]).map(move |x| (x, y)))
+}
+
+fn split<'a, T>(mut items: &'a mut [T], starts: &[usize]) -> Vec<&'a mut [T]> {
+    starts
+        .windows(2)
+        .map(|w| {
+            let (part, rest) = std::mem::take(&mut items).split_at_mut(w[1] - w[0]);
+            items = rest;
+            part
+        })
+        .collect()
+}
+
+fn share(flags: &[u8]) -> f64 {
+    if flags.is_empty() {
+        return 0.0;
+    }
+    flags.iter().map(|&f| u64::from(f)).sum::<u64>() as f64 / flags.len() as f64
+}
+
+/// Runs all tasks on `threads` threads; returns wall seconds and the CPU seconds of all threads.
+fn parallel<T: Intersect, R: Send>(
+    threads: usize,
+    make_tracer: &(impl Fn() -> T + Sync),
+    tasks: &mut [&mut [R]],
+    work: impl Fn(&mut T, usize, &mut [R]) + Sync,
+) -> (f64, f64) {
+    let next = AtomicUsize::new(0);
+    let tasks: Vec<_> = tasks.iter_mut().map(|task| Mutex::new(&mut **task)).collect();
+    let worker = || {
+        let mut tracer = make_tracer();
+        let before = thread_cpu().as_secs_f64();
+        loop {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            let Some(task) = tasks.get(i) else { break };
+            work(&mut tracer, i, &mut task.lock());
+        }
+        thread_cpu().as_secs_f64() - before
+    };
+    let start = Instant::now();
+    let cpu = std::thread::scope(|scope| {
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(worker)).collect();
+        let own = worker();
+        own + others.into_iter().map(|w| w.join().unwrap_or_else(|p| std::panic::resume_unwind(p))).sum::<f64>()
+    });
+    (start.elapsed().as_secs_f64(), cpu)
+}
+
+fn measure(settings: &BenchSettings, rays: usize, pass: &mut impl FnMut(usize) -> (f64, f64)) -> Rates {
+    let mut with = |threads: usize| {
+        let (mut wall, mut cpu) = (Vec::new(), Vec::new());
+        for _ in 0..settings.repeat {
+            let (w, c) = pass(threads);
+            wall.push(w);
+            cpu.push(c / threads as f64);
+        }
+        let millions = 1e-6 * rays as f64;
+        let best = wall.iter().copied().fold(f64::INFINITY, f64::min);
+        if rays == 0 {
+            return Rate::default();
+        }
+        Rate { median: millions / median(&mut wall), best: millions / best, cpu: millions / median(&mut cpu) }
+    };
+    let t1 = with(1);
+    Rates { t1, tn: if settings.threads > 1 { with(settings.threads) } else { t1 } }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    if n % 2 == 1 { values[n / 2] } else { 0.5 * (values[n / 2 - 1] + values[n / 2]) }
+}
+
+/// A number in [0,1) from two, with 24 bits.
+fn uniform(a: u32, b: u32) -> f32 {
+    (hash2(a, b) >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// A cosine-distributed direction about the unit vector `n`, in the frame of Duff et al. 2017; f32 throughout, as the
+/// recipe has it.
+fn cosine_direction(n: Vec3, u1: f32, u2: f32) -> Vec3 {
+    let (sin, cos) = (std::f32::consts::TAU * u1).sin_cos();
+    let r = u2.sqrt();
+    let sign = 1f32.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    let tangent = Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x);
+    let bitangent = Vec3::new(b, sign + n.y * n.y * a, -n.y);
+    r * cos * tangent + r * sin * bitangent + (1.0 - u2).max(0.0).sqrt() * n
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn median_of_even_and_odd_counts() {
+        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), 2.5);
+    }
+
+    #[test]
+    fn polygon_parameters_tell_the_sub_quad() {
+        let hit = Hit {
+            t: 1.0,
+            primitive: crate::math::PrimitiveRef {
+                mesh: crate::ids::MeshId(0),
+                patch: crate::ids::PatchId(0),
+                cell: 0,
+                half: 0,
+            },
+            face: crate::ids::FaceId(0),
+            sub: 6,
+            u: 0.25,
+            v: 0.75,
+            normal_in_object: Vec3::X,
+        };
+        assert_eq!(face_parameters(5, &hit), [4.75, 3.25]);
+        assert_eq!(face_parameters(4, &hit), [0.25, 0.75]);
+    }
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        let settings = BenchSettings { size: [37, 21], threads: 1, ao: 1, repeat: 1, passes: [true; 3], diagonal: 1.0 };
+        let description =
+            crate::scene::description::CameraDescription { eye: DVec3::ZERO, at: DVec3::X, up: DVec3::Y, fov: 35.0 };
+        let mut pixels = Bench::new(&Camera::new(&description), settings).pixel;
+        pixels.sort_unstable();
+        assert_eq!(pixels, (0..37 * 21).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,50 @@
+//! From a description and its meshes to a world and a camera.
+
+use super::camera::Camera;
+use super::description::{Rate, SceneDescription};
+use super::rate::DicingRate;
+use super::world::{World, WorldMesh};
+use crate::error::Result;
+use crate::math::DBounds;
+use crate::mesh::ControlMesh;
+use crate::scene::description::CameraDescription;
+use glam::DVec3;
+
+/// The camera of a description: its own, or one that frames all meshes. `meshes[i]` belongs to `description.meshes[i]`.
+pub fn camera_of(description: &SceneDescription, meshes: &[ControlMesh]) -> CameraDescription {
+    let framed = || {
+        let boxes = description.meshes.iter().zip(meshes).map(|(d, mesh)| {
+            let corners = corners(mesh.bounds());
+            corners.map(|p| d.world_from_object.transform_point3(p)).collect::<DBounds>()
+        });
+        CameraDescription::framing(boxes.fold(DBounds::EMPTY, DBounds::union))
+    };
+    description.camera.unwrap_or_else(framed)
+}
+
+fn corners(b: DBounds) -> impl Iterator<Item = DVec3> {
+    let pick = |k: u32, axis: u32, a: f64, b: f64| if (k >> axis) & 1 == 0 { a } else { b };
+    let n = if b.is_empty() { 0 } else { 8 };
+    (0..n).map(move |k| {
+        DVec3::new(pick(k, 0, b.min.x, b.max.x), pick(k, 1, b.min.y, b.max.y), pick(k, 2, b.min.z, b.max.z))
+    })
+}
+
+/// Prepares all meshes for tracing. Every mesh of the description must have its rate; pixels are those of a picture
+/// `height` pixels high seen through `camera`. `done` is called with the number of meshes that are ready.
+pub fn compile(
+    description: &SceneDescription,
+    meshes: Vec<ControlMesh>,
+    camera: &Camera,
+    height: u32,
+    n_threads: usize,
+    done: &mut dyn FnMut(usize),
+) -> Result<World> {
+    let mut compiled = Vec::with_capacity(meshes.len());
+    for (mesh_description, mesh) in description.meshes.iter().zip(meshes) {
+        let rate = DicingRate::new(mesh_description.rate.unwrap_or(Rate::Pixels(1.0)), camera, height);
+        compiled.push(WorldMesh::from_description(mesh_description, mesh, rate, n_threads)?);
+        done(compiled.len());
+    }
+    Ok(World::new(compiled))
+}
