@@ -7,7 +7,7 @@ use crate::mesh::{ControlMesh, Edit, EditKind, EditValue};
 #[derive(Clone, Debug)]
 pub(super) struct PlacedEdit {
     n_steps: u32,
-    place: Place,
+    pub(super) place: Place,
     kind: EditKind,
     /// Vertex or edge of the face; 0 for face edits.
     element: usize,
