@@ -27,6 +27,7 @@ pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod render;
+pub mod report;
 pub mod scene;
 pub mod subdiv;
 pub mod topology;

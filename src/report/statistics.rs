@@ -1,0 +1,230 @@
+//! The statistics of a render as data.
+
+use crate::cache::CacheStatistics;
+use crate::render::RayCounts;
+use serde::Serialize;
+
+/// Everything counted and timed during one render.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RenderStatistics {
+    /// Version of the program.
+    pub version: String,
+    /// What was rendered: the path as the user gave it.
+    pub input: String,
+    /// Worker threads.
+    pub threads: usize,
+    /// The picture.
+    pub picture: PictureReport,
+    /// Rays by kind.
+    pub rays: RayReport,
+    /// What was there to tessellate, and what was touched.
+    pub geometry: GeometryReport,
+    /// The tessellation cache.
+    pub cache: CacheReport,
+    /// Memory of the process.
+    pub memory: MemoryReport,
+    /// Time by phase.
+    pub seconds: PhaseSeconds,
+}
+
+/// The picture that was asked for and how far it came.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct PictureReport {
+    /// Columns of the whole picture.
+    pub width: u32,
+    /// Rows of the whole picture.
+    pub height: u32,
+    /// Pixels to render: all, or those of the crop window.
+    pub pixels: usize,
+    /// Pixels rendered; less than `pixels` after an interruption.
+    pub pixels_done: usize,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// The integrator's name on the command line.
+    pub integrator: String,
+}
+
+/// Rays by kind, and their sum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct RayReport {
+    /// Number of rays of each kind.
+    #[serde(flatten)]
+    pub counts: RayCounts,
+    /// Rays of all kinds.
+    pub total: u64,
+}
+
+/// Sizes of the scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct GeometryReport {
+    /// Meshes.
+    pub meshes: usize,
+    /// Faces of all control meshes.
+    pub control_faces: usize,
+    /// Patches of all meshes.
+    pub patches: usize,
+    /// Patches of which at least one grid was built.
+    pub patches_touched: usize,
+    /// Grid pieces built, rebuilt ones included.
+    pub grids_built: u64,
+    /// Bytes that stay for the whole render: control meshes, plans, bounds, top level.
+    pub resident_bytes: u64,
+    /// Triangles of the full tessellation.
+    pub full_triangles: u64,
+    /// Bytes of the full tessellation with its hierarchy, in the cache's own format.
+    pub full_bytes: u64,
+}
+
+/// The cache's counters. `lookups = hits + compulsory_misses + capacity_misses + other_misses`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct CacheReport {
+    /// Size in bytes; `None` (null) if unbounded.
+    pub capacity_bytes: Option<u64>,
+    /// Blocks asked for.
+    pub lookups: u64,
+    /// Blocks that were there.
+    pub hits: u64,
+    /// Hits per lookup, 0 to 1.
+    pub hit_rate: f64,
+    /// Misses of blocks that nobody had built before.
+    pub compulsory_misses: u64,
+    /// Misses of blocks that had been evicted.
+    pub capacity_misses: u64,
+    /// Misses while another thread built the block, or below a block that could not be kept.
+    pub other_misses: u64,
+    /// Blocks built and used once, because they could not be kept.
+    pub bypasses: u64,
+    /// Bytes of all blocks built.
+    pub bytes_built: u64,
+    /// Seconds spent building, summed over threads; estimated from a sample.
+    pub build_seconds: f64,
+    /// Times that a segment was emptied and filled again.
+    pub segments_recycled: u64,
+    /// Most bytes in use at once.
+    pub peak_bytes: u64,
+}
+
+impl CacheReport {
+    /// The report of a cache with `capacity_bytes` (`None`: unbounded) and these counters.
+    pub fn new(capacity_bytes: Option<u64>, counters: &CacheStatistics) -> Self {
+        Self {
+            capacity_bytes,
+            lookups: counters.lookups,
+            hits: counters.hits,
+            hit_rate: counters.hit_rate(),
+            compulsory_misses: counters.compulsory_misses,
+            capacity_misses: counters.capacity_misses,
+            other_misses: counters.misses() - counters.compulsory_misses - counters.capacity_misses,
+            bypasses: counters.bypasses(),
+            bytes_built: counters.bytes_built,
+            build_seconds: counters.build_time.as_secs_f64(),
+            segments_recycled: counters.segments_recycled,
+            peak_bytes: counters.peak_bytes,
+        }
+    }
+}
+
+/// Memory of the process.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MemoryReport {
+    /// Bytes allowed by `--memory`; `None` (null) without it.
+    pub budget_bytes: Option<u64>,
+    /// Most bytes ever resident; `None` (null) where the system does not tell.
+    pub peak_resident_bytes: Option<u64>,
+}
+
+/// A duration twice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Seconds {
+    /// By the clock on the wall.
+    pub wall: f64,
+    /// Processor time, summed over threads.
+    pub cpu: f64,
+}
+
+impl From<(f64, f64)> for Seconds {
+    /// From wall and processor seconds.
+    fn from((wall, cpu): (f64, f64)) -> Self {
+        Self { wall, cpu }
+    }
+}
+
+/// Time by phase; the phases follow one another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct PhaseSeconds {
+    /// Reading and checking files.
+    pub load: Seconds,
+    /// Topology, plans, rates, bounds, top level.
+    pub prepare: Seconds,
+    /// Tracing and shading.
+    pub render: Seconds,
+    /// Writing pictures.
+    pub write: Seconds,
+}
+
+impl PhaseSeconds {
+    /// All phases together.
+    pub fn total(&self) -> Seconds {
+        let phases = [self.load, self.prepare, self.render, self.write];
+        phases.iter().fold(Seconds::default(), |sum, s| Seconds { wall: sum.wall + s.wall, cpu: sum.cpu + s.cpu })
+    }
+}
+
+impl From<RayCounts> for RayReport {
+    fn from(counts: RayCounts) -> Self {
+        Self { counts, total: counts.total() }
+    }
+}
+
+impl RenderStatistics {
+    /// The statistics as one JSON object, on several lines, with a line end.
+    pub fn to_json(&self) -> String {
+        let mut text = serde_json::to_string_pretty(self).expect("plain numbers and strings have a JSON form");
+        text.push('\n');
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+    use std::collections::BTreeSet;
+
+    /// `a.b.c` for every value that is no object.
+    fn keys(prefix: &str, value: &Value, found: &mut BTreeSet<String>) {
+        match value {
+            Value::Object(members) => members.iter().for_each(|(key, value)| {
+                let path = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+                keys(&path, value, found);
+            }),
+            _ => _ = found.insert(prefix.to_owned()),
+        }
+    }
+
+    #[test]
+    fn json_keys_are_those_of_the_notes() {
+        let json = serde_json::from_str(&RenderStatistics::default().to_json()).unwrap();
+        let mut written = BTreeSet::new();
+        keys("", &json, &mut written);
+        let notes = include_str!("../../notes/statistics.md");
+        let rows = notes.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+        let documented: BTreeSet<String> = rows.map(str::to_owned).collect();
+        assert_eq!(written, documented);
+    }
+
+    #[test]
+    fn cache_misses_add_up() {
+        let counters = CacheStatistics {
+            lookups: 100,
+            hits: 90,
+            compulsory_misses: 4,
+            capacity_misses: 3,
+            concurrent_misses: 2,
+            bypassed_parent_misses: 1,
+            ..Default::default()
+        };
+        let report = CacheReport::new(Some(1024), &counters);
+        assert_eq!((report.hit_rate, report.other_misses), (0.9, 3));
+    }
+}
