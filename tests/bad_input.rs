@@ -3,9 +3,11 @@
 //! Seeded mutations of valid files go through the readers. A panic fails the test with the seed in its message; run
 //! that case alone by setting the loop to it.
 
+mod common;
+
 use lazytess::io::obj::parse_obj;
 use lazytess::io::scene_file::parse_scene;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Files that use every statement of the format.
@@ -117,22 +119,10 @@ fn mutated_scene_never_panics_and_errors_are_sentences() {
     });
 }
 
-/// Meshes beside the repository, which are not part of it.
-fn shared(folder: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("LAZYTESS_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    let path = root.join(folder);
-    if !path.is_dir() {
-        eprintln!("skipped: {} is not there (set LAZYTESS_SHARED)", path.display());
-        return None;
-    }
-    Some(path)
-}
-
 #[test]
 fn every_shared_mesh_is_read_without_warning() {
     for folder in ["meshes/opensubdiv", "meshes/models"] {
-        let Some(folder) = shared(folder) else { return };
+        let Some(folder) = common::shared(folder) else { return };
         for file in std::fs::read_dir(folder).unwrap() {
             let path = file.unwrap().path();
             if path.extension().is_some_and(|e| e == "obj") {

@@ -6,13 +6,20 @@
 //!
 //! Help lists the flags that change the picture apart from those that only change speed: [`PICTURE`] and [`SPEED`].
 
+pub mod bench;
 pub mod camera;
+pub mod check;
 mod generate;
+pub mod info;
 pub mod input;
 pub mod interrupt;
+pub mod picture;
 pub mod progress;
+pub mod render;
 pub mod run_options;
+pub mod sample;
 pub mod stdout;
+pub mod tessellate;
 pub mod values;
 
 use crate::error::{Error, Result};
@@ -36,6 +43,7 @@ pub struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    Sample(sample::SampleArgs),
     Generate(generate::GenerateArgs),
 }
 
@@ -43,6 +51,7 @@ impl Cli {
     /// Does what was asked for.
     pub fn run(self) -> Result<()> {
         match self.command {
+            Command::Sample(args) => args.run(),
             Command::Generate(args) => args.run(),
         }
     }

@@ -13,5 +13,6 @@ pub mod obj_write;
 pub mod picture;
 pub mod png;
 pub mod process;
+pub mod samples;
 pub mod scene_file;
 pub mod write;

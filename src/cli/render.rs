@@ -1,0 +1,170 @@
+//! `lazytess render`: a scene or mesh becomes a picture.
+
+use super::input::{load_scene, settle_rates};
+use super::picture::PictureArgs;
+use super::run_options::{MemoryArgs, RunArgs};
+use super::values::{ByteSize, CacheSize};
+use super::{PICTURE, camera::CameraArgs};
+use crate::error::{Error, Result};
+use crate::render::{Aov, RenderSettings};
+use crate::scene::description::SceneDescription;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Render a scene or a mesh
+///
+/// A bare mesh gets a camera that frames it, a key light and a neutral material. Ctrl-C stops, writes what is done and
+/// exits with 130. Statistics go to stderr in words and with --stats to a file as JSON.
+#[derive(Args, Clone, Debug)]
+pub struct RenderArgs {
+    /// scene.toml or mesh.obj
+    pub input: PathBuf,
+    /// Picture to write: .exr (linear, 16-bit half, layers) or .png (8-bit sRGB)
+    #[arg(short, long, value_name = "OUT.exr|OUT.png")]
+    pub output: PathBuf,
+    /// Further layers of the EXR file, such as Z,N,patch
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = PICTURE)]
+    pub aov: Vec<Aov>,
+    /// Write the statistics as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    /// The picture
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// Speed
+    #[command(flatten)]
+    pub run: RunArgs,
+    /// Memory
+    #[command(flatten)]
+    pub memory: MemoryArgs,
+}
+
+/// File formats of pictures.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum PictureFormat {
+    /// OpenEXR.
+    Exr,
+    /// PNG.
+    Png,
+}
+
+/// A render, resolved and checked; no mesh has been read.
+#[derive(Clone, Debug)]
+pub struct RenderJob {
+    /// Camera, meshes (each with its rate), lights.
+    pub scene: SceneDescription,
+    /// Replaces parts of the scene's or default camera.
+    pub camera: CameraArgs,
+    /// What to render.
+    pub settings: RenderSettings,
+    /// Where the picture goes.
+    pub output: PathBuf,
+    /// As what.
+    pub format: PictureFormat,
+    /// Where the statistics go.
+    pub stats: Option<PathBuf>,
+    /// Bytes for tessellated patches, unless `memory` decides.
+    pub cache: CacheSize,
+    /// Bytes for everything.
+    pub memory: Option<u64>,
+    /// Worker threads.
+    pub threads: usize,
+    /// Neither bar nor summary.
+    pub quiet: bool,
+}
+
+impl PictureFormat {
+    /// By the file's extension.
+    pub fn of(path: &Path) -> Result<Self> {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("exr") => Ok(Self::Exr),
+            Some("png") => Ok(Self::Png),
+            _ => Err(Error::input("a picture's name should end in .exr or .png").at(path, None)),
+        }
+    }
+}
+
+impl RenderArgs {
+    /// Reads the scene file and settles everything that was left open.
+    pub fn job(self) -> Result<RenderJob> {
+        let format = PictureFormat::of(&self.output)?;
+        if format == PictureFormat::Png && !self.aov.is_empty() {
+            return Err(Error::input("--aov needs an EXR file: a PNG has no layers").at(&self.output, None));
+        }
+        for file in [Some(&self.output), self.stats.as_ref()].into_iter().flatten() {
+            check_folder(file)?;
+        }
+        let mut scene = load_scene(&self.input)?;
+        settle_rates(&mut scene, self.picture.rate);
+        Ok(RenderJob {
+            settings: self.picture.settings(&scene, self.aov)?,
+            scene,
+            camera: self.picture.camera,
+            output: self.output,
+            format,
+            stats: self.stats,
+            cache: self.run.cache(),
+            memory: self.memory.memory.map(|ByteSize(bytes)| bytes),
+            threads: self.run.threads(),
+            quiet: self.run.quiet,
+        })
+    }
+}
+
+/// Better told before an hour of rendering than after.
+fn check_folder(file: &Path) -> Result<()> {
+    match file.parent() {
+        Some(folder) if folder != Path::new("") && !folder.is_dir() => {
+            Err(Error::input(format!("there is no folder {} to write to", folder.display())).at(file, None))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Typed {
+        #[command(flatten)]
+        render: RenderArgs,
+    }
+
+    fn job(line: &str) -> std::result::Result<RenderJob, String> {
+        let typed = Typed::try_parse_from(format!("test {line}").split_whitespace()).map_err(|e| e.to_string())?;
+        typed.render.job().map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn every_flag_of_the_contract_is_understood() {
+        let line = "m.obj -o out.exr --size 64x48 --spp 2 --integrator debug:uv --rate fixed:8 --cache 16M --threads 3 \
+                    --crop 1,2,3,4 --eye 1,2,-3 --at -1,0,0 --up 0,0,1 --fov 40 --aov Z,N --stats s.json --quiet";
+        let job = job(line).unwrap();
+        assert_eq!((job.cache, job.threads, job.quiet), (CacheSize::Bytes(16 << 20), 3, true));
+        assert_eq!(job.settings.aovs, [Aov::Depth, Aov::Normal]);
+        assert_eq!(job.scene.meshes[0].rate, "fixed:8".parse().ok());
+        assert_eq!(job.camera.eye.map(|eye| eye.z), Some(-3.0));
+    }
+
+    #[test]
+    fn mistakes_are_told_before_work_begins() {
+        let cases = [
+            ("m.obj -o out.jpg", "out.jpg: a picture's name should end in .exr or .png"),
+            ("m.obj -o out.png --aov Z", "out.png: --aov needs an EXR file"),
+            ("m.obj -o no/such/out.png", "no/such/out.png: there is no folder no/such to write to"),
+            ("m.ply -o out.png", "m.ply: is neither a scene (.toml) nor a mesh (.obj)"),
+            ("none.toml -o out.png", "cannot read none.toml"),
+            ("m.obj -o a.png --cache 1M --memory 1G", "error: the argument '--cache <SIZE|unbounded>' cannot be used"),
+            ("m.obj -o a.png --aov W", "error: invalid value 'W' for '--aov <LIST>'"),
+            ("m.obj -o a.png --threads 0", "error: invalid value '0' for '--threads <N>'"),
+            ("m.obj", "error: the following required arguments were not provided"),
+        ];
+        for (line, expected) in cases {
+            let message = job(line).unwrap_err();
+            assert!(message.starts_with(expected), "{line}: {message}");
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! Places on a surface to be evaluated: CSV with `face,sub,u,v` in its first columns.
+
+use crate::error::{Error, Result};
+use crate::ids::FaceId;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// A place on a mesh's limit surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SamplePlace {
+    /// The face, in file order.
+    pub face: FaceId,
+    /// Which of its quads: 0 for a quad, the corner's number for other faces.
+    pub sub: u32,
+    /// Parameters within that quad, 0..=1.
+    pub u: f64,
+    /// See `u`.
+    pub v: f64,
+}
+
+/// Reads places; comment lines (`#`), one header line and further columns are passed over.
+pub fn read_sample_places(path: &Path) -> Result<Vec<SamplePlace>> {
+    let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
+    parse_sample_places(BufReader::new(file), path)
+}
+
+fn parse_sample_places(reader: impl BufRead, path: &Path) -> Result<Vec<SamplePlace>> {
+    let mut places = Vec::new();
+    for (i, line) in reader.lines().enumerate() {
+        let line = line.map_err(|e| Error::io("read", path, e))?;
+        let row = line.trim();
+        if row.is_empty() || row.starts_with('#') || (places.is_empty() && row.starts_with("face,sub,u,v")) {
+            continue;
+        }
+        places.push(parse_row(row).map_err(|message| Error::input(message).at(path, Some(i + 1)))?);
+    }
+    Ok(places)
+}
+
+fn parse_row(row: &str) -> Result<SamplePlace, String> {
+    let mut columns = row.split(',').map(str::trim);
+    let mut column = |name: &str| columns.next().ok_or_else(|| format!("column {name} of face,sub,u,v is missing"));
+    let id = |text: &str| text.parse::<u32>().map_err(|_| format!("'{text}' is no number of a face or quad"));
+    let parameter = |text: &str| {
+        let value = text.parse::<f64>().ok().filter(|t| (0.0..=1.0).contains(t));
+        value.ok_or_else(|| format!("parameter '{text}' should lie within 0..1"))
+    };
+    Ok(SamplePlace {
+        face: FaceId(id(column("face")?)?),
+        sub: id(column("sub")?)?,
+        u: parameter(column("u")?)?,
+        v: parameter(column("v")?)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Vec<SamplePlace>> {
+        parse_sample_places(text.as_bytes(), Path::new("s.csv"))
+    }
+
+    #[test]
+    fn comments_header_and_further_columns_are_passed_over() {
+        let places = parse("# limit points\nface,sub,u,v,px\n0,0,0.25,1,7\r\n\n 3, 2, 0, 0.5\n").unwrap();
+        let place = |face, sub, u, v| SamplePlace { face: FaceId(face), sub, u, v };
+        assert_eq!(places, [place(0, 0, 0.25, 1.0), place(3, 2, 0.0, 0.5)]);
+    }
+
+    #[test]
+    fn every_mistake_gets_a_sentence_with_its_line() {
+        let cases = [
+            ("0,0,0\n", "s.csv:1: column v of face,sub,u,v is missing"),
+            ("0,0,0,0\nx,0,0,0\n", "s.csv:2: 'x' is no number of a face or quad"),
+            ("0,-1,0,0\n", "s.csv:1: '-1' is no number"),
+            ("0,0,1.5,0\n", "s.csv:1: parameter '1.5' should lie within 0..1"),
+            ("0,0,nan,0\n", "s.csv:1: parameter 'nan' should"),
+        ];
+        for (text, expected) in cases {
+            let message = parse(text).unwrap_err().to_string();
+            assert!(message.starts_with(expected), "{text:?}: {message}");
+        }
+    }
+}
