@@ -1,5 +1,6 @@
 //! What the cache counts. Each pin counts for itself and adds its numbers to the cache's when it is dropped.
 
+use serde::{Serialize, Serializer};
 use std::cell::Cell;
 use std::iter::Sum;
 use std::ops::AddAssign;
@@ -12,7 +13,7 @@ const TIMED_BUILDS: u64 = 13;
 /// Counters summed over all pins that were dropped.
 ///
 /// `lookups = hits + misses()`, and every miss is one of compulsory, capacity, concurrent and bypassed-parent.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
 #[non_exhaustive]
 pub struct CacheStatistics {
     /// Blocks asked for.
@@ -40,8 +41,10 @@ pub struct CacheStatistics {
     /// Bytes of all blocks built, wherever they went.
     pub bytes_built: u64,
     /// Time from claim to publication, estimated from one build in thirteen.
+    #[serde(serialize_with = "as_seconds")]
     pub build_time: Duration,
     /// Time of the builds that other threads made superfluous.
+    #[serde(serialize_with = "as_seconds")]
     pub time_lost: Duration,
     /// Blocks copied to the current segment because they were still used.
     pub reinsertions: u64,
@@ -49,6 +52,10 @@ pub struct CacheStatistics {
     pub segments_recycled: u64,
     /// The most bytes ever in use at once. Of the cache, not of pins.
     pub peak_bytes: u64,
+}
+
+fn as_seconds<S: Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(time.as_secs_f64())
 }
 
 impl CacheStatistics {

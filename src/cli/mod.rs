@@ -13,6 +13,8 @@ mod generate;
 pub mod info;
 pub mod input;
 pub mod interrupt;
+mod job;
+mod output;
 pub mod picture;
 pub mod progress;
 pub mod render;
@@ -43,7 +45,10 @@ pub struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    Render(render::RenderArgs),
     Sample(sample::SampleArgs),
+    Tessellate(tessellate::TessellateArgs),
+    Bench(bench::BenchArgs),
     Generate(generate::GenerateArgs),
 }
 
@@ -51,7 +56,10 @@ impl Cli {
     /// Does what was asked for.
     pub fn run(self) -> Result<()> {
         match self.command {
+            Command::Render(args) => args.run(),
             Command::Sample(args) => args.run(),
+            Command::Tessellate(args) => args.run(),
+            Command::Bench(args) => args.run(),
             Command::Generate(args) => args.run(),
         }
     }

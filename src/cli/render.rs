@@ -1,15 +1,24 @@
 //! `lazytess render`: a scene or mesh becomes a picture.
 
 use super::input::{load_scene, settle_rates};
+use super::interrupt::cancel_on_interrupt;
+use super::job::{Prepared, RenderScene};
 use super::picture::PictureArgs;
 use super::run_options::{MemoryArgs, RunArgs};
 use super::values::{ByteSize, CacheSize};
-use super::{PICTURE, camera::CameraArgs};
-use crate::error::{Error, Result};
+use super::{PICTURE, camera::CameraArgs, output};
+use crate::error::{Error, ErrorKind, Result};
+use crate::io::process::{Stopwatch, peak_resident_bytes};
+use crate::io::write::write_whole;
+use crate::render::workers::Rendered;
 use crate::render::{Aov, RenderSettings};
+use crate::report::{CacheReport, GeometryReport, MemoryReport, PictureReport, RayReport, RenderStatistics};
 use crate::scene::description::SceneDescription;
+use crate::scene::world::GridCache;
 use clap::Args;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
 /// Render a scene or a mesh
 ///
@@ -109,6 +118,92 @@ impl RenderArgs {
             threads: self.run.threads(),
             quiet: self.run.quiet,
         })
+    }
+}
+
+impl RenderArgs {
+    /// Renders and writes.
+    pub fn run(self) -> Result<()> {
+        let input = self.input.display().to_string();
+        self.job()?.run(&input)
+    }
+}
+
+impl RenderJob {
+    fn run(self, input: &str) -> Result<()> {
+        let cancel = cancel_on_interrupt()?;
+        let scene = RenderScene { scene: &self.scene, camera: self.camera, settings: &self.settings };
+        let mut prepared = scene.prepare(self.threads, self.quiet)?;
+        let cache = prepared.cache(self.cache, self.threads)?;
+        let watch = Stopwatch::start();
+        let rendered = prepared.render(&cache, self.threads, self.quiet, &cancel);
+        prepared.seconds.render = watch.seconds().into();
+        let watch = Stopwatch::start();
+        output::write_film(&self.output, self.format, &rendered.film)?;
+        prepared.seconds.write = watch.seconds().into();
+        self.report(input, &prepared, &cache, &rendered)?;
+        if cancel.load(Ordering::Relaxed) && !rendered.complete {
+            let (done, all) = (rendered.film.n_done(), self.settings.window.n_pixels());
+            let message = format!("interrupted: {done} of {all} pixels are done and in {}", self.output.display());
+            return Err(Error::new(ErrorKind::Interrupted, message));
+        }
+        Ok(())
+    }
+
+    fn report(&self, input: &str, prepared: &Prepared<'_>, cache: &GridCache, rendered: &Rendered) -> Result<()> {
+        if self.quiet && self.stats.is_none() {
+            return Ok(());
+        }
+        let statistics = self.statistics(input, prepared, cache, rendered);
+        if let Some(path) = &self.stats {
+            let json = statistics.to_json();
+            write_whole(path, |out| out.write_all(json.as_bytes()))?;
+        }
+        if !self.quiet {
+            eprint!("{statistics}");
+        }
+        Ok(())
+    }
+
+    fn statistics(
+        &self,
+        input: &str,
+        prepared: &Prepared<'_>,
+        cache: &GridCache,
+        rendered: &Rendered,
+    ) -> RenderStatistics {
+        let full = prepared.world.full_tessellation(self.threads);
+        let capacity = match self.cache {
+            CacheSize::Bytes(bytes) => Some(bytes),
+            CacheSize::Unbounded => None,
+        };
+        RenderStatistics {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            input: input.to_owned(),
+            threads: self.threads,
+            picture: PictureReport {
+                width: self.settings.size[0],
+                height: self.settings.size[1],
+                pixels: self.settings.window.n_pixels(),
+                pixels_done: rendered.film.n_done(),
+                spp: self.settings.spp,
+                integrator: self.settings.integrator.to_string(),
+            },
+            rays: RayReport { counts: rendered.rays, total: rendered.rays.total() },
+            geometry: GeometryReport {
+                meshes: prepared.world.meshes().len(),
+                control_faces: prepared.control_faces,
+                patches: prepared.world.n_patches(),
+                patches_touched: cache.patches_touched() as usize,
+                grids_built: cache.pieces_built(),
+                resident_bytes: (prepared.world.bytes() + cache.table_bytes()) as u64,
+                full_triangles: full.triangles,
+                full_bytes: full.bytes,
+            },
+            cache: CacheReport::new(capacity, &cache.segments().statistics()),
+            memory: MemoryReport { budget_bytes: self.memory, peak_resident_bytes: peak_resident_bytes() },
+            seconds: prepared.seconds,
+        }
     }
 }
 

@@ -37,7 +37,11 @@ impl RunArgs {
 
     /// Number of worker threads, at least 1.
     pub fn threads(&self) -> usize {
-        let available = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        self.threads.map_or_else(available, |n| n as usize)
+        self.threads.map_or_else(Self::available_threads, |n| n as usize)
+    }
+
+    /// One thread for each processor that this process may use.
+    pub fn available_threads() -> usize {
+        std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
     }
 }

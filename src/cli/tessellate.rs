@@ -1,9 +1,21 @@
-//! `lazytess tessellate`: the tessellation itself, for other programs.
+//! `lazytess tessellate`: the triangles themselves.
 
+use super::input::load_mesh;
+use super::run_options::RunArgs;
+use crate::error::Result;
+use crate::io::write::write_whole;
+use crate::scene::rate::DicingRate;
+use crate::scene::tessellate::tessellate;
+use crate::scene::world::WorldMesh;
 use clap::Args;
+use glam::DAffine3;
+use std::io::Write;
 use std::path::PathBuf;
 
-/// Write the limit surface as an OBJ of triangles or quads
+/// Write the tessellation as an OBJ of triangles
+///
+/// All vertices lie on the limit surface and neighbouring patches share them: the result is as closed as the control
+/// mesh. The triangles of each control face are a group `face_N`, N in file order from 0.
 #[derive(Args, Clone, Debug)]
 pub struct TessellateArgs {
     /// mesh.obj
@@ -14,7 +26,29 @@ pub struct TessellateArgs {
     /// File to write
     #[arg(short, long, value_name = "OUT.obj")]
     pub output: PathBuf,
-    /// No progress bar
-    #[arg(long, short)]
-    pub quiet: bool,
+}
+
+impl TessellateArgs {
+    /// Writes the file.
+    pub fn run(&self) -> Result<()> {
+        let mesh = load_mesh(&self.mesh)?;
+        let rate = DicingRate::Fixed(self.rate);
+        let mesh = WorldMesh::new(mesh, DAffine3::IDENTITY, rate, RunArgs::available_threads())?;
+        write_whole(&self.output, |out| {
+            let mut faces = Vec::new();
+            let mut face = None;
+            tessellate(
+                &mesh,
+                |p| writeln!(out, "v {} {} {}", p.x, p.y, p.z),
+                |patch, [a, b, c]| {
+                    let of = mesh.surface().face_of(patch).0;
+                    if face.replace(of) != Some(of) {
+                        writeln!(faces, "g face_{of}")?;
+                    }
+                    writeln!(faces, "f {} {} {}", a + 1, b + 1, c + 1)
+                },
+            )?;
+            out.write_all(&faces)
+        })
+    }
 }

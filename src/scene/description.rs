@@ -8,6 +8,7 @@
 //! (diffuse 1) that faces a directional light of irradiance π has radiance 1, and so has one under a sky of radiance 1.
 
 use glam::{DAffine3, DVec3, Vec3};
+use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -267,6 +268,14 @@ impl IntegratorKind {
         ("debug:depth", Self::Debug(DebugView::Depth)),
         ("debug:miss", Self::Debug(DebugView::Miss)),
     ];
+}
+
+impl fmt::Display for IntegratorKind {
+    /// Its name on the command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named = Self::ALL.iter().find(|(_, kind)| kind == self);
+        f.write_str(named.map_or("", |(name, _)| name))
+    }
 }
 
 impl FromStr for IntegratorKind {

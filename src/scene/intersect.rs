@@ -42,6 +42,8 @@ struct Builder {
     /// The mesh that `dicer` remembers a patch of.
     mesh: Option<MeshId>,
     n_built: u64,
+    n_pieces: u64,
+    n_triangles: u64,
 }
 
 /// Evaluates normals; remembers the last patch, which shading asks about again and again.
@@ -120,6 +122,8 @@ impl Builder {
         let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
         if cells.size().iter().all(|&n| n <= MAX_CELLS) {
             self.dicer.dice(of.mesh.surface(), of.patch, &rates, i, j, &mut self.vertices);
+            self.n_pieces += 1;
+            self.n_triangles += 2 * cells.size().iter().product::<usize>() as u64;
             let layout = PieceLayout::new(&self.vertices, cells);
             let vertices = &self.vertices;
             return ticket
@@ -413,6 +417,12 @@ fn normal_in_object(normal: Vec3, step: f64) -> Vec3 {
 fn triangle_id(world: &World, of: &PrimitiveRef) -> TriangleId {
     let n_u = world.mesh(of.mesh).patch_rates(of.patch).n_u;
     TriangleId::new(of.patch, of.cell % n_u, of.cell / n_u, u32::from(of.half))
+}
+
+impl Drop for Intersector<'_> {
+    fn drop(&mut self) {
+        self.cache.add_built(self.builder.n_pieces, self.builder.n_triangles);
+    }
 }
 
 impl Intersect for Intersector<'_> {

@@ -311,6 +311,8 @@ pub struct GridCache {
     tables: Vec<SlotTable>,
     /// A bit per leaf slot, set when its patch is first asked for.
     touched: Vec<Box<[AtomicU64]>>,
+    triangles_built: AtomicU64,
+    pieces_built: AtomicU64,
 }
 
 impl GridCache {
@@ -320,7 +322,13 @@ impl GridCache {
         let n_slots = || world.meshes.iter().map(|m| m.top.n_slots());
         let tables = n_slots().map(|n| segments.table(n)).collect();
         let bits = |n: usize| (0..n.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
-        Ok(Self { tables, touched: n_slots().map(bits).collect(), segments })
+        Ok(Self {
+            tables,
+            touched: n_slots().map(bits).collect(),
+            triangles_built: AtomicU64::new(0),
+            pieces_built: AtomicU64::new(0),
+            segments,
+        })
     }
 
     /// The memory and its counters.
@@ -340,6 +348,21 @@ impl GridCache {
         if word.load(Ordering::Relaxed) & bit == 0 {
             word.fetch_or(bit, Ordering::Relaxed);
         }
+    }
+
+    pub(super) fn add_built(&self, pieces: u64, triangles: u64) {
+        self.pieces_built.fetch_add(pieces, Ordering::Relaxed);
+        self.triangles_built.fetch_add(triangles, Ordering::Relaxed);
+    }
+
+    /// Triangles of all pieces that tracers built until they ended, rebuilt ones counted again.
+    pub fn triangles_built(&self) -> u64 {
+        self.triangles_built.load(Ordering::Relaxed)
+    }
+
+    /// Pieces that tracers built until they ended, rebuilt ones counted again.
+    pub fn pieces_built(&self) -> u64 {
+        self.pieces_built.load(Ordering::Relaxed)
     }
 
     /// Patches that some ray asked for.

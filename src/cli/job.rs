@@ -1,0 +1,99 @@
+//! From a described scene to a picture: what all commands that render have in common.
+
+use super::camera::CameraArgs;
+use super::input::load_mesh;
+use super::progress::Progress;
+use super::values::CacheSize;
+use crate::cache::CacheConfig;
+use crate::error::Result;
+use crate::io::process::Stopwatch;
+use crate::mesh::ControlMesh;
+use crate::render::settings::{self, Appearance, RenderSettings, RunSettings};
+use crate::render::workers::{Rendered, render};
+use crate::report::PhaseSeconds;
+use crate::scene::camera::Camera;
+use crate::scene::compile::{camera_of, compile};
+use crate::scene::description::SceneDescription;
+use crate::scene::intersect::Intersector;
+use crate::scene::world::{GridCache, World};
+use std::sync::atomic::AtomicBool;
+
+/// A scene whose meshes have not been read.
+pub struct RenderScene<'a> {
+    /// Camera, meshes (each with its rate), lights.
+    pub scene: &'a SceneDescription,
+    /// Replaces parts of the scene's or default camera.
+    pub camera: CameraArgs,
+    /// What to render.
+    pub settings: &'a RenderSettings,
+}
+
+/// A scene ready to be traced.
+pub struct Prepared<'a> {
+    scene: &'a SceneDescription,
+    settings: &'a RenderSettings,
+    /// Geometry.
+    pub world: World,
+    /// Point of view.
+    pub camera: Camera,
+    /// Faces of all control meshes.
+    pub control_faces: usize,
+    /// Time so far.
+    pub seconds: PhaseSeconds,
+}
+
+impl<'a> RenderScene<'a> {
+    /// Reads the meshes and prepares them.
+    pub fn prepare(self, threads: usize, quiet: bool) -> Result<Prepared<'a>> {
+        let watch = Stopwatch::start();
+        let meshes = self.read_meshes(quiet)?;
+        let control_faces = meshes.iter().map(ControlMesh::n_faces).sum();
+        let mut seconds = PhaseSeconds { load: watch.seconds().into(), ..Default::default() };
+        let watch = Stopwatch::start();
+        let camera = Camera::new(&self.camera.apply(camera_of(self.scene, &meshes))?);
+        let (progress, n) = (Progress::new("meshes prepared", quiet), meshes.len());
+        let height = self.settings.size[1];
+        let world = compile(self.scene, meshes, &camera, height, threads, &mut |k| progress.set(k, n))?;
+        progress.finish();
+        seconds.prepare = watch.seconds().into();
+        Ok(Prepared { scene: self.scene, settings: self.settings, world, camera, control_faces, seconds })
+    }
+
+    fn read_meshes(&self, quiet: bool) -> Result<Vec<ControlMesh>> {
+        let progress = Progress::new("meshes read", quiet);
+        let n = self.scene.meshes.len();
+        let read = self.scene.meshes.iter().enumerate().map(|(i, description)| {
+            let mesh = load_mesh(&description.file)?;
+            progress.set(i + 1, n);
+            Ok(mesh)
+        });
+        let meshes = read.collect();
+        progress.finish();
+        meshes
+    }
+}
+
+impl Prepared<'_> {
+    /// An empty cache of that size.
+    pub fn cache(&self, size: CacheSize, threads: usize) -> Result<GridCache> {
+        let most = match size {
+            // Pieces may need a third more than the middle vertex format, and segments are not filled to the last byte.
+            CacheSize::Unbounded => 2 * self.world.full_tessellation(threads).bytes as usize + (64 << 20),
+            CacheSize::Bytes(_) => 0,
+        };
+        GridCache::new(&self.world, CacheConfig { capacity: size.capacity(most), ..CacheConfig::with_bytes(0) })
+    }
+
+    /// Renders, with a progress bar where one can be seen.
+    pub fn render(&self, cache: &GridCache, threads: usize, quiet: bool, cancel: &AtomicBool) -> Rendered {
+        let materials = self.scene.meshes.iter().map(|m| m.material.clone()).collect();
+        let appearance = Appearance::new(materials, self.scene.lights.clone(), self.scene.background);
+        let progress = Progress::new("pixels", quiet);
+        let report = |p: settings::Progress| progress.set(p.done, p.total);
+        let run = RunSettings { progress: &report, ..RunSettings::quiet(threads, cancel) };
+        let make_tracer = || Intersector::new(&self.world, cache);
+        let rendered = render(&self.camera, &appearance, self.settings, &run, make_tracer);
+        progress.finish();
+        rendered
+    }
+}
