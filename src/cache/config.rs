@@ -61,8 +61,8 @@ impl RingShape {
         let at_least = lines_for(bytes).div_ceil(MAX_SEGMENT_LINES).next_power_of_two();
         let wanted = segments.map_or_else(|| default_segments(bytes), |n| n.clamp(2, 1 << 20).next_power_of_two());
         let segments = wanted.max(at_least);
-        // 3 % of the memory or one segment: what threads may fill while another is inside a visit.
-        let grace = (segments / 32).max(1);
+        // A sixteenth of the memory: what others may fill while the system keeps a thread asleep inside its visit.
+        let grace = (segments / 16).max(1);
         Self { segments, segment_lines: (bytes / LINE / segments).min(MAX_SEGMENT_LINES), grace }
     }
 }

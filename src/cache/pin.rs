@@ -10,42 +10,47 @@ use super::stats::{CacheStatistics, Counters, count};
 use super::sync::{AtomicU64, AtomicUsize, Ordering, fence};
 use super::word::{Place, first_word_of, without_builder};
 use crossbeam::utils::CachePadded;
-use parking_lot::Mutex;
 use std::marker::PhantomData;
 
+/// The value of a pin word that belongs to no thread.
+const FREE: u64 = 0;
 /// The value of a pin word whose thread reads nothing. Ages start at 2.
-const UNPINNED: u64 = 0;
+const UNPINNED: u64 = 1;
 
 /// The pin words of all threads, where recyclers look.
 pub(super) struct Pins {
     words: Box<[CachePadded<AtomicU64>]>,
-    free: Mutex<Vec<usize>>,
     /// Pin words that were ever used: the first so many.
     n_used: AtomicUsize,
 }
 
 impl Pins {
     pub(super) fn new(max_threads: usize) -> Self {
-        let words = (0..max_threads).map(|_| CachePadded::new(AtomicU64::new(UNPINNED))).collect();
-        Self { words, free: Mutex::new((0..max_threads).rev().collect()), n_used: AtomicUsize::new(0) }
+        let words = (0..max_threads).map(|_| CachePadded::new(AtomicU64::new(FREE))).collect();
+        Self { words, n_used: AtomicUsize::new(0) }
     }
 
+    /// A pin word for one thread. `Acquire` and the `Release` of `give_back` order what its last owner read before what
+    /// recyclers do that see the new owner's age in it.
     fn take(&self) -> Option<usize> {
-        let idx = self.free.lock().pop()?;
+        let taken = |word: &AtomicU64| {
+            word.load(Ordering::Relaxed) == FREE
+                && word.compare_exchange(FREE, UNPINNED, Ordering::Acquire, Ordering::Relaxed).is_ok()
+        };
+        let idx = self.words.iter().position(|word| taken(word))?;
         self.n_used.fetch_max(idx + 1, Ordering::AcqRel);
         Some(idx)
     }
 
     fn give_back(&self, idx: usize) {
-        self.words[idx].store(UNPINNED, Ordering::Release);
-        self.free.lock().push(idx);
+        self.words[idx].store(FREE, Ordering::Release);
     }
 
     /// Whether a pin stands at an age before `age`. `Acquire` orders what that pin's thread read before it moved on
     /// before everything that follows here: the head's advance and all writes to the recycled segment.
     pub(super) fn any_before(&self, age: u64) -> bool {
         let used = &self.words[..self.n_used.load(Ordering::Acquire)];
-        used.iter().map(|word| word.load(Ordering::Acquire)).any(|pin| pin != UNPINNED && pin < age)
+        used.iter().map(|word| word.load(Ordering::Acquire)).any(|pin| pin > UNPINNED && pin < age)
     }
 }
 

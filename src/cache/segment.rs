@@ -69,7 +69,8 @@ impl Ring {
 
     /// Ages below this are so old that a hit may copy the block to the head.
     pub(super) fn oldest_kept(&self, age: u64) -> u64 {
-        self.oldest_readable(age) + (self.n_segments() - self.grace) / 4
+        let quarter = (self.n_segments() - self.grace) / 4;
+        self.oldest_readable(age) + quarter.max(u64::from(self.n_segments() > 2))
     }
 
     #[inline(always)]
