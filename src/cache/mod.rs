@@ -69,6 +69,8 @@
 //!    the head at `h`, fences, and then scans the pins to open `h + 1`. Both fences are `SeqCst`. If `h > p`, the pin's
 //!    thread has looked at the head before the recycler, hence fenced before it, hence the scan sees the pin word. If
 //!    `h <= p` the recycler opens at most `p + 1 <= p + G`, which the pin allows anyway; this is why `G >= 1`.
+//!    (With `G = 1` the recycler's own pin stands at `h`, so that it has fenced already when it moved there, and the fence
+//!    before the scan repeats what is done; with a longer grace it is needed.)
 //! 5. *What was read is read before it is overwritten.* A pin word is stored with `Release` and scanned with `Acquire`,
 //!    the head is advanced with `Release` after the scan, and who writes in a segment has loaded the head with `Acquire`.
 //!    Every thread that may advance the head has made its own scan, so it does not matter whose advance succeeds.
