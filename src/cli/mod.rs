@@ -9,6 +9,7 @@
 pub mod bench;
 pub mod camera;
 pub mod check;
+pub mod compare;
 mod generate;
 pub mod info;
 pub mod input;
@@ -49,6 +50,7 @@ enum Command {
     Sample(sample::SampleArgs),
     Tessellate(tessellate::TessellateArgs),
     Bench(bench::BenchArgs),
+    Compare(compare::CompareArgs),
     Generate(generate::GenerateArgs),
 }
 
@@ -60,6 +62,7 @@ impl Cli {
             Command::Sample(args) => args.run(),
             Command::Tessellate(args) => args.run(),
             Command::Bench(args) => args.run(),
+            Command::Compare(args) => args.run(),
             Command::Generate(args) => args.run(),
         }
     }

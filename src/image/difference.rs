@@ -32,6 +32,11 @@ impl DifferenceMap {
         Self { width, values }
     }
 
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
     /// The differences, row by row.
     pub fn values(&self) -> &[f32] {
         &self.values
