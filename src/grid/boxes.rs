@@ -142,17 +142,19 @@ impl Slabs {
     fn test<K: Kernel>(&self, kernel: K, head: &Head, first: usize, t_max: f32) -> (u32, [f32; 8]) {
         let (mut enter, mut leave) = (kernel.splat(0.0), kernel.splat(t_max));
         for k in 0..3 {
-            let step = kernel.splat(self.step[k]);
-            let t = |plane: usize, offset: f32| {
-                let q: &[u8; 8] = head.planes[plane][first..first + 8].try_into().expect("eight lanes");
-                kernel.add(kernel.mul(kernel.widen(q), step), kernel.splat(offset))
-            };
-            let near = self.near_plane[k];
-            enter = kernel.max(t(near, self.near[k]), enter);
-            leave = kernel.min(t((near + 3) % 6, self.far[k]), leave);
+            let (near, step) = (self.near_plane[k], kernel.splat(self.step[k]));
+            enter = kernel.max(plane_t(kernel, head, near, first, step, self.near[k]), enter);
+            leave = kernel.min(plane_t(kernel, head, (near + 3) % 6, first, step, self.far[k]), leave);
         }
         (kernel.le(enter, leave), kernel.store(enter))
     }
+}
+
+/// t of one plane of the eight lanes from `first`.
+#[inline(always)]
+fn plane_t<K: Kernel>(k: K, head: &Head, plane: usize, first: usize, step: K::F, offset: f32) -> K::F {
+    let q: &[u8; 8] = head.planes[plane][first..first + 8].try_into().expect("eight lanes");
+    k.add(k.mul(k.widen(q), step), k.splat(offset))
 }
 
 /// The lanes of a block that a ray meets, and where it enters each.

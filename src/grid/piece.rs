@@ -170,12 +170,21 @@ impl<'b> PieceView<'b> {
     }
 
     /// Lattice point (i, j) of the piece, 0 <= i <= n_u, 0 <= j <= n_v.
+    #[inline]
     pub fn vertex(&self, i: usize, j: usize) -> [i32; 3] {
+        match self.head.format {
+            2 => self.read::<2>(i, j),
+            3 => self.read::<3>(i, j),
+            _ => self.read::<4>(i, j),
+        }
+    }
+
+    #[inline(always)]
+    fn read<const BYTES: usize>(&self, i: usize, j: usize) -> [i32; 3] {
         std::array::from_fn(|k| {
-            let bytes = usize::from(self.head.format);
-            let at = self.row_start(j, k) + bytes * i;
+            let at = self.row_start(j, k) + BYTES * i;
             let mut word = [0; 4];
-            word[..bytes].copy_from_slice(&self.bytes[at..at + bytes]);
+            word[..BYTES].copy_from_slice(&self.bytes[at..at + BYTES]);
             self.head.base[k] + i32::from_le_bytes(word)
         })
     }

@@ -113,42 +113,68 @@ impl Found {
     }
 }
 
+/// One coordinate of the nine vertices of a block, relative to the ray's origin. Four lanes are vertices 0 to 2 of a row and one more.
+struct Rows<K: Kernel> {
+    /// Rows 0 and 1.
+    low: K::F,
+    /// Rows 1 and 2.
+    high: K::F,
+}
+
+// No closures over lanes here: code that is not `#[inline(always)]` is compiled without the kernel's instructions, twenty times slower.
+impl<K: Kernel> Rows<K> {
+    #[inline(always)]
+    fn load<const BYTES: usize>(piece: &PieceView, k: K, origin: f32, block: usize, axis: usize) -> Self {
+        let (column, row) = (2 * (block & 3), 2 * (block >> 2));
+        let at = piece.row_start(row, axis) + BYTES * column;
+        let next = piece.row_start(1, axis) - piece.row_start(0, axis);
+        let (base, origin) = (piece.head.base[axis], k.splat(origin));
+        // SAFETY: `PieceView::new` checked that the bytes hold every vertex of the lanes in the head and the tail after them. `block` is one of
+        // those lanes, so each place is at least three coordinates before the end of the vertices. The load reads four coordinates,
+        // and for BYTES = 3 four bytes more: at most one coordinate and four bytes beyond the vertices, eight bytes, the tail's size.
+        let (low, high) = unsafe {
+            (
+                k.integers::<BYTES>(piece.bytes, [at, at + next], base),
+                k.integers::<BYTES>(piece.bytes, [at + next, at + 2 * next], base),
+            )
+        };
+        Self { low: k.sub(low, origin), high: k.sub(high, origin) }
+    }
+
+    #[inline(always)]
+    fn sheared(self, k: K, shear: f32, z: &Self) -> Self {
+        let shear = k.splat(shear);
+        Self { low: k.sub(self.low, k.mul(shear, z.low)), high: k.sub(self.high, k.mul(shear, z.high)) }
+    }
+
+    #[inline(always)]
+    fn scaled(self, k: K, scale: f32) -> Self {
+        let scale = k.splat(scale);
+        Self { low: k.mul(self.low, scale), high: k.mul(self.high, scale) }
+    }
+
+    /// First, second and third vertices of the eight triangles: first is v00 for half 0 and v11 for half 1, see the picture in mod.rs.
+    #[inline(always)]
+    fn corners(self, k: K) -> [K::F; 3] {
+        [k.pick_0112(self.low, self.high), k.pick_1201(self.low, self.high), k.pick_0112(self.high, self.low)]
+    }
+}
+
 impl<K: Kernel> Eight<K> {
     #[inline(always)]
-    fn load<const BYTES: usize>(piece: &PieceView, kernel: K, ray: &LatticeRay, block: usize) -> Self {
-        let (column, row) = (2 * (block & 3), 2 * (block >> 2));
-        // Vertices 0 to 2 of two rows each, relative to the ray's origin: rows 0 and 1, rows 1 and 2.
-        let rows = |axis: usize| {
-            let at: [usize; 3] = std::array::from_fn(|j| piece.row_start(row + j, axis) + BYTES * column);
-            let origin = kernel.splat(ray.origin[axis]);
-            [[at[0], at[1]], [at[1], at[2]]].map(|at| {
-                // SAFETY: `PieceView::new` checked that the block holds every vertex of the lanes in its head and the tail after them.
-                // `block` is one of those lanes, so `at` is at most four coordinates before the end of the vertices but one; the load
-                // reads four coordinates (and, for BYTES = 3, four bytes more): at most one coordinate and four bytes of the tail's eight.
-                let v = unsafe { kernel.integers::<BYTES>(piece.bytes, at, piece.head.base[axis]) };
-                kernel.sub(v, origin)
-            })
-        };
+    fn load<const BYTES: usize>(piece: &PieceView, k: K, ray: &LatticeRay, block: usize) -> Self {
         let [kx, ky, kz] = ray.axes;
-        let z = rows(kz);
-        let sheared = |axis: usize, shear: f32| {
-            let (rows, shear) = (rows(axis), kernel.splat(shear));
-            [0, 1].map(|r| kernel.sub(rows[r], kernel.mul(shear, z[r])))
-        };
-        let (x, y) = (sheared(kx, ray.shear[0]), sheared(ky, ray.shear[1]));
-        let z = z.map(|z| kernel.mul(z, kernel.splat(ray.shear[2])));
-        // First vertices are v00 for half 0 and v11 for half 1, and so on: see the picture in mod.rs.
-        let corners = |[a, b]: [K::F; 2]| [kernel.pick_0112(a, b), kernel.pick_1201(a, b), kernel.pick_0112(b, a)];
-        Self { x: corners(x), y: corners(y), z: corners(z) }
+        let z = Rows::load::<BYTES>(piece, k, ray.origin[kz], block, kz);
+        let x = Rows::load::<BYTES>(piece, k, ray.origin[kx], block, kx).sheared(k, ray.shear[0], &z);
+        let y = Rows::load::<BYTES>(piece, k, ray.origin[ky], block, ky).sheared(k, ray.shear[1], &z);
+        Self { x: x.corners(k), y: y.corners(k), z: z.scaled(k, ray.shear[2]).corners(k) }
     }
 
     /// The triangles hit with 0 <= t <= `t_max`.
     #[inline(always)]
     fn test(&self, k: K, t_max: f32) -> Option<Found> {
-        let Self { x, y, z } = self;
-        // Twice the area opposite vertex a: of two triangles that share the edge b c, one gets the exact negative of the other's.
-        let edge = |b: usize, c: usize| k.sub(k.mul(x[c], y[b]), k.mul(y[c], x[b]));
-        let (u, v, w) = (edge(1, 2), edge(2, 0), edge(0, 1));
+        let (u, v, w) = (self.edge(k, 1, 2), self.edge(k, 2, 0), self.edge(k, 0, 1));
+        let z = &self.z;
         let zero = k.splat(0.0);
         let (least, greatest) = (k.min(k.min(u, v), w), k.max(k.max(u, v), w));
         let inside = k.le(zero, least) | k.le(greatest, zero);
@@ -169,14 +195,42 @@ impl<K: Kernel> Eight<K> {
         (found.mask != 0).then_some(found)
     }
 
+    /// Twice the area between the ray and the edge from corner b to corner c: of two triangles that share an edge, one gets the exact
+    /// negative of the other's.
+    #[inline(always)]
+    fn edge(&self, k: K, b: usize, c: usize) -> K::F {
+        k.sub(k.mul(self.x[c], self.y[b]), k.mul(self.y[c], self.x[b]))
+    }
+
+    #[inline(always)]
+    fn settle(&self, k: K, lanes: u32, t_max: f32, found: &mut Found) {
+        let arrays = Arrays { x: self.stored(k, &self.x), y: self.stored(k, &self.y), z: self.stored(k, &self.z) };
+        arrays.settle(lanes, t_max, found);
+    }
+
+    #[inline(always)]
+    fn stored(&self, k: K, corners: &[K::F; 3]) -> [[f32; 8]; 3] {
+        [k.store(corners[0]), k.store(corners[1]), k.store(corners[2])]
+    }
+}
+
+/// [`Eight`] as arrays.
+struct Arrays {
+    x: [[f32; 8]; 3],
+    y: [[f32; 8]; 3],
+    z: [[f32; 8]; 3],
+}
+
+impl Arrays {
     /// Where an edge function vanished in single precision its sign is not known: decide in double precision, where products are exact.
     #[cold]
     #[inline(never)]
-    fn settle(&self, k: K, lanes: u32, t_max: f32, found: &mut Found) {
-        let [x, y, z] = [self.x, self.y, self.z].map(|c| c.map(|c| k.store(c)));
+    fn settle(&self, lanes: u32, t_max: f32, found: &mut Found) {
         for lane in (0..8).filter(|lane| lanes >> lane & 1 == 1) {
             let at = |c: [[f32; 8]; 3]| c.map(|c| f64::from(c[lane]));
-            if let Some((t, second, third)) = settle_one(at(x), at(y), at(z)).filter(|h| 0.0 <= h.0 && h.0 <= t_max) {
+            if let Some((t, second, third)) =
+                settle_one(at(self.x), at(self.y), at(self.z)).filter(|h| 0.0 <= h.0 && h.0 <= t_max)
+            {
                 found.mask |= 1 << lane;
                 (found.t[lane], found.second[lane], found.third[lane]) = (t, second, third);
             }

@@ -2,4 +2,8 @@
 
 mod boxes;
 mod encoding;
+mod rays;
+mod slow;
 mod support;
+mod tracing;
+mod watertight;

@@ -1,6 +1,6 @@
 //! The top level: a tree over the boxes of a mesh's patches, in lattice space.
 //!
-//! obvhs builds a binary tree; `collapse.rs` turns it into a **wide tree** whose **nodes** have up to eight **lanes**. A lane is empty, an
+//! It is a **wide tree**: its **nodes** have up to eight **lanes**. A lane is empty, an
 //! inner node or a **leaf**: one patch. A leaf is named by its **leaf slot**, `8 * node + lane`; the cache's table of slots is indexed by it, so
 //! its address is known as soon as the leaf is put on the stack, and can be fetched ahead.
 //!
@@ -15,12 +15,12 @@
 //! # Invariants
 //! 1. A lane's box holds every box below it.
 //! 2. The test of a box is conservative against the triangle test ([`LatticeRay`](crate::grid::LatticeRay) has the argument), so a patch that a ray hits is visited.
-//! 3. Leaves are visited in the order of their entry; those entered at exactly `t_max` are visited too, so that ties are seen.
+//! 3. The lanes of a node are visited in the order of their entry; those entered at exactly `t_max` are visited too, so that ties are seen.
+//! 4. No arrangement of boxes makes the tree deep or its build quadratic.
 //!
-//! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Ylitie, Karras, Laine 2017 (collapse), Ize 2013 and Woop et al. 2013 (slabs). Read `traverse.rs` first.
+//! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs). Read `traverse.rs` first.
 
 mod build;
-mod collapse;
 mod traverse;
 
 use crate::ids::PatchId;

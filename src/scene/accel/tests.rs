@@ -1,28 +1,212 @@
-//! The wide tree against a list.
+//! The wide tree against a list of boxes.
 
 use super::*;
 use crate::grid::{LatticeRay, TriangleId};
 use crate::math::Bounds;
-use crate::math::simd::Portable;
+use crate::math::simd::{Kernel, Portable, Task, run};
 use glam::{DVec3, Vec3};
+
+/// Numbers in [0, 1) that are the same in every run.
+fn random(n: u64) -> f64 {
+    let z = (n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ (z >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    ((z ^ (z >> 32)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+fn random_point(n: u64, r: f64) -> DVec3 {
+    DVec3::from_array([3 * n, 3 * n + 1, 3 * n + 2].map(|n| r * (2.0 * random(n) - 1.0)))
+}
+
+/// Boxes of sizes from a point up to `size` within the cube of half-width 8 million.
+fn scattered(n: u64, size: f64) -> Vec<Bounds> {
+    let corners = |i: u64| {
+        let p = random_point(2 * i, 8e6 - size);
+        [p, p + if i.is_multiple_of(5) { DVec3::ZERO } else { random_point(2 * i + 1, size) }]
+    };
+    (0..n).map(|i| corners(i).into_iter().map(|p| p.as_vec3()).collect()).collect()
+}
+
+fn ray(origin: DVec3, direction: DVec3) -> LatticeRay {
+    LatticeRay::new(origin, direction, f32::INFINITY, TriangleId::NONE)
+}
+
+/// Every patch that a traversal without hits visits, in order; `occluded` must visit the same.
+struct Visits<'a>(&'a TopLevel, &'a LatticeRay);
+
+impl Task for Visits<'_> {
+    type Output = Vec<LeafRef>;
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> Vec<LeafRef> {
+        let mut stack = TraversalStack::default();
+        let (mut nearest_first, mut unordered) = (vec![], vec![]);
+        self.0.closest(kernel, self.1, &mut stack, |_| {}, |leaf, _| nearest_first.push(leaf));
+        let collect = |leaf| {
+            unordered.push(leaf);
+            false
+        };
+        assert!(!self.0.occluded(kernel, self.1, &mut stack, |_| {}, collect));
+        unordered.sort_unstable_by_key(|l| l.slot);
+        let mut sorted = nearest_first.clone();
+        sorted.sort_unstable_by_key(|l| l.slot);
+        assert_eq!(sorted, unordered);
+        nearest_first
+    }
+}
+
+/// Where the ray enters the box in f64; `None` if it does not meet it.
+fn entry(b: &Bounds, origin: DVec3, direction: DVec3) -> Option<f64> {
+    let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+    for k in 0..3 {
+        let (low, high) = (f64::from(b.min[k]) - origin[k], f64::from(b.max[k]) - origin[k]);
+        if direction[k] == 0.0 {
+            if low > 0.0 || high < 0.0 {
+                return None;
+            }
+        } else {
+            enter = enter.max((low / direction[k]).min(high / direction[k]));
+            leave = leave.min((low / direction[k]).max(high / direction[k]));
+        }
+    }
+    (enter <= leave).then_some(enter)
+}
 
 #[test]
 fn a_tree_over_nothing_visits_nothing() {
     let tree = TopLevel::build(&[]);
-    let ray = LatticeRay::new(DVec3::ZERO, DVec3::X, f32::INFINITY, TriangleId::NONE);
-    tree.closest(Portable, &ray, &mut TraversalStack::default(), |_| {}, |leaf, _| panic!("visited {leaf:?}"));
-    assert!(!tree.occluded(Portable, &ray, &mut TraversalStack::default(), |_| {}, |_| true));
+    assert_eq!(run(Visits(&tree, &ray(DVec3::ZERO, DVec3::X))), []);
 }
 
 #[test]
 fn every_patch_is_one_leaf() {
     for n in [1, 2, 3, 8, 9, 100, 5000] {
-        let boxes: Vec<Bounds> =
-            (0..n).map(|i| [Vec3::splat(i as f32), Vec3::new(0.0, 1.0, i as f32)].into_iter().collect()).collect();
-        let tree = TopLevel::build(&boxes);
+        let tree = TopLevel::build(&scattered(n, 1e5));
         let mut patches: Vec<usize> = tree.leaves().map(|l| l.patch.idx()).collect();
         patches.sort_unstable();
-        assert_eq!(patches, (0..n).collect::<Vec<_>>());
+        assert_eq!(patches, (0..n as usize).collect::<Vec<_>>());
         assert!(tree.leaves().all(|l| (l.slot as usize) < tree.n_slots()));
     }
+}
+
+#[test]
+fn every_box_that_a_ray_meets_is_visited_and_few_others() {
+    for (size, n) in [(10.0, 1), (1e6, 2), (2e5, 3000)] {
+        let boxes = scattered(n, size);
+        let tree = TopLevel::build(&boxes);
+        for i in 0..600 {
+            // Through a corner of a box, along an axis or any way, from near or far.
+            let target = boxes[(random(i) * n as f64) as usize].min.as_dvec3();
+            let direction =
+                if i % 3 == 0 { [DVec3::X, DVec3::NEG_Y, -DVec3::Z][i as usize % 7 % 3] } else { random_point(i, 1.0) };
+            let origin = (target - direction * 10f64.powi(i as i32 % 8)).as_vec3().as_dvec3();
+            let ray = ray(origin, direction);
+            let visits = run(Visits(&tree, &ray));
+            assert_eq!(visits, Visits(&tree, &ray).run(Portable), "the kernels differ");
+            let direction = DVec3::from_array(std::array::from_fn(|k| {
+                if direction[k] == 0.0 { 0.0 } else { 1.0 / f64::from(ray.inv[k]) }
+            }));
+            for (patch, b) in boxes.iter().enumerate() {
+                let is_visited = visits.iter().any(|v| v.patch.idx() == patch);
+                assert!(is_visited || entry(b, origin, direction).is_none(), "ray {i}: patch {patch} is not visited");
+                assert!(
+                    !is_visited || entry(&b.expanded(64.0), origin, direction).is_some(),
+                    "ray {i}: patch {patch} is far"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn leaves_beyond_a_hit_are_not_visited() {
+    let boxes = scattered(3000, 2e6);
+    let tree = TopLevel::build(&boxes);
+    let mut stack = TraversalStack::default();
+    let mut n_visits = [0; 2];
+    for i in 0..200 {
+        let ray = ray(random_point(i, 8e6), random_point(i + 1000, 1.0));
+        let direction = DVec3::from_array(ray.inv.map(|x| 1.0 / f64::from(x)));
+        let origin = DVec3::from_array(ray.origin.map(f64::from));
+        tree.closest(
+            Portable,
+            &ray,
+            &mut stack,
+            |_| {},
+            |leaf, t_max| {
+                let t = entry(&boxes[leaf.patch.idx()].expanded(64.0), origin, direction).expect("the box is met");
+                assert!(t <= f64::from(*t_max) + 64.0, "{t} beyond {t_max}");
+                n_visits[0] += 1;
+                if leaf.patch.0.is_multiple_of(3) {
+                    *t_max = t_max.min(t as f32 + 1e5);
+                }
+            },
+        );
+        n_visits[1] += run(Visits(&tree, &ray)).len();
+    }
+    assert!(2 * n_visits[0] < n_visits[1], "hits hide little: {n_visits:?}");
+}
+
+#[test]
+fn occlusion_stops_at_the_first_hit() {
+    let tree = TopLevel::build(&scattered(3000, 4e6));
+    let mut n_visits = 0;
+    let first = |_| {
+        n_visits += 1;
+        true
+    };
+    assert!(tree.occluded(Portable, &ray(DVec3::ZERO, DVec3::ONE), &mut TraversalStack::default(), |_| {}, first));
+    assert_eq!(n_visits, 1);
+}
+
+#[test]
+fn a_leaf_is_announced_before_its_visit() {
+    let tree = TopLevel::build(&scattered(500, 6e6));
+    let announced = std::cell::RefCell::new(vec![false; tree.n_slots()]);
+    let announce = |slot: u32| announced.borrow_mut()[slot as usize] = true;
+    let mut n_visits = 0;
+    tree.closest(
+        Portable,
+        &ray(DVec3::X, DVec3::new(1.0, 0.2, 0.1)),
+        &mut TraversalStack::default(),
+        announce,
+        |leaf, _| {
+            assert!(announced.borrow()[leaf.slot as usize]);
+            n_visits += 1;
+        },
+    );
+    assert!(n_visits > 0);
+}
+
+#[test]
+fn boxes_without_number_in_one_place_are_a_tree_too() {
+    for b in [
+        Bounds { min: Vec3::splat(3.0), max: Vec3::splat(3.0) },
+        Bounds { min: Vec3::splat(-8e6), max: Vec3::splat(8e6) },
+    ] {
+        let tree = TopLevel::build(&vec![b; 20_000]);
+        let visits = run(Visits(&tree, &ray(DVec3::new(3.0, 3.0, -9e6), DVec3::Z)));
+        assert_eq!(visits.len(), 20_000);
+        assert!(tree.stack_need < 60, "{}", tree.stack_need);
+    }
+}
+
+#[test]
+fn a_ribbon_of_equal_boxes_makes_a_shallow_tree() {
+    let boxes =
+        (0..100_000).map(|i| Vec3::X * (64 * i) as f32).map(|p| Bounds { min: p, max: p + Vec3::new(64.0, 64.0, 0.0) });
+    assert!(TopLevel::build(&boxes.collect::<Vec<_>>()).stack_need < 60);
+}
+
+#[test]
+fn boxes_of_growing_size_make_a_tree_of_bounded_depth() {
+    let boxes = (0..20_000)
+        .map(|i| f32::powf(2.0, 24.0 * i as f32 / 20_000.0))
+        .map(|r| Bounds { min: Vec3::splat(r), max: Vec3::splat(1.01 * r) });
+    assert!(TopLevel::build(&boxes.collect::<Vec<_>>()).stack_need < 400);
+}
+
+#[test]
+fn a_tree_takes_less_than_sixty_bytes_a_patch() {
+    let tree = TopLevel::build(&scattered(20_000, 1e5));
+    let per_patch = tree.bytes() as f64 / 20_000.0;
+    assert!(per_patch < 60.0, "{per_patch}");
 }

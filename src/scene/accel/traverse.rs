@@ -25,7 +25,7 @@ fn t_of(entry: Entry) -> f32 {
 }
 
 impl TopLevel {
-    /// Calls `visit` for the patches whose boxes the ray meets, nearest first, until the rest lie beyond `t_max`. It is given as [`LatticeRay::t_max`]
+    /// Calls `visit` for the patches whose boxes the ray meets, the nearest of each node first, until the rest lie beyond `t_max`. It is given as [`LatticeRay::t_max`]
     /// and `visit` makes it smaller when it hits something. `prefetch` is called with a leaf's slot when the leaf is found, some time before its visit.
     #[inline(always)]
     pub fn closest<K: Kernel>(
@@ -101,7 +101,9 @@ impl TopLevel {
             } else {
                 let inner = wide.refs[lane];
                 let lines: *const [u8; 64] = (&raw const self.nodes[inner as usize]).cast();
-                (0..4).for_each(|line| k.prefetch(lines.wrapping_add(line)));
+                for line in 0..4 {
+                    k.prefetch(lines.wrapping_add(line));
+                }
                 inner
             };
             stack.push(entry(t_near[lane], target));
@@ -123,13 +125,18 @@ impl WideNode {
         let (mut enter, mut leave) = (k.splat(0.0), k.splat(t_max));
         for axis in 0..3 {
             let inv = k.splat(ray.inv[axis]);
-            let t = |plane: usize, origin: f32| k.mul(k.sub(k.load(&self.planes[plane]), k.splat(origin)), inv);
             let near = axis + 3 * ray.is_negative[axis];
             let far = axis + 3 * (1 - ray.is_negative[axis]);
-            enter = k.max(t(near, ray.near_origin[axis]), enter);
-            leave = k.min(t(far, ray.far_origin[axis]), leave);
+            enter = k.max(self.plane_t(k, near, ray.near_origin[axis], inv), enter);
+            leave = k.min(self.plane_t(k, far, ray.far_origin[axis], inv), leave);
         }
         (k.le(enter, leave), k.store(enter))
+    }
+
+    /// t of one plane of all lanes.
+    #[inline(always)]
+    fn plane_t<K: Kernel>(&self, k: K, plane: usize, origin: f32, inv: K::F) -> K::F {
+        k.mul(k.sub(k.load(&self.planes[plane]), k.splat(origin)), inv)
     }
 }
 

@@ -1,0 +1,115 @@
+//! What does a ray cost against one piece of 8x8 cells, and what does writing the piece cost? `cargo bench --bench ray_against_grid`
+
+use bytemuck::{Pod, Zeroable};
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+use glam::DVec3;
+use lazytess::grid::{CellRect, LatticeHit, LatticeRay, PieceLayout, PieceView, TriangleId};
+use lazytess::ids::PatchId;
+use lazytess::math::simd::{Kernel, Portable, Task, run};
+
+fn main() {
+    divan::main();
+}
+
+const CELLS: CellRect = CellRect { i0: 0, j0: 0, i1: 8, j1: 8 };
+
+/// A cache line.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Line([u8; 64]);
+
+/// A bump of 9x9 vertices, `width` steps wide.
+fn vertices(width: f64) -> Vec<[i32; 3]> {
+    let point = |i: f64, j: f64| DVec3::new(i, j, 1.5 - 0.1 * ((i - 4.0).powi(2) + (j - 3.0).powi(2))) * width / 8.0;
+    (0..81).map(|v| point(f64::from(v % 9), f64::from(v / 9)).round().as_ivec3().to_array()).collect()
+}
+
+fn piece(vertices: &[[i32; 3]]) -> Vec<Line> {
+    let layout = PieceLayout::new(vertices, CELLS);
+    let mut block = vec![Line([0; 64]); layout.bytes() / 64];
+    layout.encode(vertices, bytemuck::cast_slice_mut(&mut block));
+    block
+}
+
+/// Rays from above towards the piece; most hit it.
+fn rays(width: f64) -> Vec<LatticeRay> {
+    let ray = |r: usize| {
+        let [a, b, c] = [0.618_033_988_7, 0.754_877_666_2, 0.569_840_290_9].map(|x| (r as f64 * x).fract());
+        let target = DVec3::new(0.9 * a + 0.05, 0.9 * b + 0.05, 0.1) * width;
+        let origin = DVec3::new(c - 0.5, 0.5 - a * c, 1.5) * width;
+        LatticeRay::new(origin, target - origin, f32::INFINITY, TriangleId::NONE)
+    };
+    (0..4096).map(ray).collect()
+}
+
+/// Traces all rays and counts the hits.
+struct Closest<'a>(PieceView<'a>, &'a [LatticeRay]);
+
+impl Task for Closest<'_> {
+    type Output = usize;
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> usize {
+        let mut n_hits = 0;
+        for ray in self.1 {
+            let mut hit = LatticeHit::none(ray.t_max());
+            n_hits += usize::from(self.0.closest(kernel, ray, PatchId(0), &mut hit));
+        }
+        n_hits
+    }
+}
+
+/// Counts the occluded rays.
+struct Occluded<'a>(PieceView<'a>, &'a [LatticeRay]);
+
+impl Task for Occluded<'_> {
+    type Output = usize;
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> usize {
+        let mut n_occluded = 0;
+        for ray in self.1 {
+            n_occluded += usize::from(self.0.occluded(kernel, ray, PatchId(0)));
+        }
+        n_occluded
+    }
+}
+
+/// Widths that need 16 and 24 bits.
+const WIDTHS: [f64; 2] = [40_000.0, 4e6];
+
+#[divan::bench(args = WIDTHS)]
+fn closest(bencher: Bencher, width: f64) {
+    let (block, rays) = (piece(&vertices(width)), rays(width));
+    let view = PieceView::new(bytemuck::cast_slice(&block));
+    bencher.counter(ItemsCount::new(rays.len())).bench(|| run(Closest(view, black_box(&rays))));
+}
+
+#[divan::bench(args = WIDTHS)]
+fn occluded(bencher: Bencher, width: f64) {
+    let (block, rays) = (piece(&vertices(width)), rays(width));
+    let view = PieceView::new(bytemuck::cast_slice(&block));
+    bencher.counter(ItemsCount::new(rays.len())).bench(|| run(Occluded(view, black_box(&rays))));
+}
+
+#[divan::bench(args = WIDTHS)]
+fn closest_portable(bencher: Bencher, width: f64) {
+    let (block, rays) = (piece(&vertices(width)), rays(width));
+    let view = PieceView::new(bytemuck::cast_slice(&block));
+    bencher.counter(ItemsCount::new(rays.len())).bench(|| Closest(view, black_box(&rays)).run(Portable));
+}
+
+#[divan::bench]
+fn make_ray(bencher: Bencher) {
+    let (origin, direction) = (DVec3::new(1e6, 2e6, 3e6), DVec3::new(0.3, -0.2, 0.9));
+    bencher.bench(|| LatticeRay::new(black_box(origin), black_box(direction), f32::INFINITY, TriangleId::NONE));
+}
+
+#[divan::bench(args = WIDTHS)]
+fn encode(bencher: Bencher, width: f64) {
+    let vertices = vertices(width);
+    let mut block = [Line([0; 64]); 18];
+    bencher.bench_local(|| {
+        let layout = PieceLayout::new(black_box(&vertices), CELLS);
+        layout.encode(&vertices, &mut bytemuck::cast_slice_mut(&mut block)[..layout.bytes()]);
+    });
+}
