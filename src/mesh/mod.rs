@@ -8,7 +8,9 @@
 
 mod control_mesh;
 mod edit;
+pub mod random;
 pub mod shapes;
+pub mod shrink;
 mod sink;
 
 pub use control_mesh::{BoundaryRule, ControlMesh, Corner, Crease, CreaseMethod, TexCoords, TriangleRule};

@@ -15,7 +15,7 @@ mod crowd;
 mod ground;
 mod hello;
 mod model;
-mod noise;
+pub(super) mod noise;
 mod odd;
 mod scan;
 mod sweep;

@@ -18,7 +18,7 @@ fn mix(x: u64) -> u64 {
 
 /// A sequence of random numbers.
 #[derive(Clone, Debug)]
-pub(super) struct Random {
+pub(in crate::mesh) struct Random {
     seed: u64,
     drawn: u64,
 }

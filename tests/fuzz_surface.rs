@@ -1,0 +1,85 @@
+//! Random control meshes: the evaluation that dices grids against the slow reference.
+//!
+//! `LAZYTESS_FUZZ=START..END cargo test --test fuzz_surface` tries other seeds. A failure is shrunk and printed as a test.
+
+use lazytess::ids::FaceId;
+use lazytess::mesh::ControlMesh;
+use lazytess::mesh::random::random_mesh;
+use lazytess::mesh::shrink::{as_test, shrink};
+use lazytess::subdiv::refine::RefinedMesh;
+use lazytess::subdiv::surface::PatchPoints;
+use lazytess::subdiv::{Evaluator, Surface};
+use std::ops::Range;
+
+/// Corners, edges, the middle, near a corner, and a place of no importance.
+const POINTS: [[f64; 2]; 9] = [
+    [0.0, 0.0],
+    [1.0, 0.0],
+    [1.0, 1.0],
+    [0.0, 1.0],
+    [0.5, 0.0],
+    [0.0, 0.375],
+    [0.5, 0.5],
+    [0.015625, 0.03125],
+    [0.8125, 0.6875],
+];
+
+fn seeds() -> Range<u64> {
+    let given = std::env::var("LAZYTESS_FUZZ").ok();
+    let range = given.as_deref().and_then(|text| text.split_once(".."));
+    range.map_or(0..150, |(a, b)| a.parse().expect("START..END")..b.parse().expect("START..END"))
+}
+
+/// Seeds whose meshes the diced surface gets wrong. Two causes:
+/// under boundary rule `None`, an edge from a vertex to itself is a boundary edge and hides the faces at the vertex;
+/// an inner vertex of a fin of doubled faces has its second sharp edge outside the ring of the face that is evaluated.
+const KNOWN: &[u64] = &[1, 24, 33, 74, 89, 126, 129];
+
+#[test]
+fn diced_surface_is_the_reference_surface_on_random_meshes() {
+    for seed in seeds().filter(|seed| !KNOWN.contains(seed)) {
+        let mesh = random_mesh(seed);
+        if difference(&mesh).is_some() {
+            let smallest = shrink(mesh, |m| difference(m).is_some());
+            let why = difference(&smallest).expect("shrinking keeps the failure");
+            panic!("seed {seed}: {why}\n{}", as_test(&smallest, &format!("seed_{seed}")));
+        }
+    }
+}
+
+#[test]
+fn known_differences_are_still_there() {
+    let mended: Vec<_> = KNOWN.iter().filter(|&&seed| difference(&random_mesh(seed)).is_none()).collect();
+    assert!(mended.is_empty(), "{mended:?} agree now: take them off the list of known differences");
+}
+
+/// Where and how the two evaluations differ, if they do; a panic is a difference too.
+fn difference(mesh: &ControlMesh) -> Option<String> {
+    std::panic::catch_unwind(|| compare(mesh)).unwrap_or_else(|_| Some("a panic, see above".into()))
+}
+
+fn compare(mesh: &ControlMesh) -> Option<String> {
+    let surface = Surface::new(mesh, 1).expect("the mesh is valid and small");
+    let reference = RefinedMesh::from_control(mesh);
+    let (mut points, mut evaluator) = (PatchPoints::default(), Evaluator::default());
+    let tolerance = 1e-6 * mesh.bounds().diagonal();
+    for (face, &size) in mesh.face_sizes.iter().enumerate() {
+        let face = FaceId::from(face);
+        for sub in 0..if size == 4 { 1 } else { size } {
+            let patch = surface.patch_of(face, sub);
+            for (uv, exact) in POINTS.iter().zip(reference.limits_at(face, sub, &POINTS)) {
+                if exact.is_some() != surface.is_visible(patch) {
+                    return Some(format!("face {face}: only one of the two has a surface"));
+                }
+                let Some(exact) = exact else { continue };
+                surface.load(patch, &mut points);
+                let sample = surface.sample(&points, &mut evaluator, uv[0], uv[1]);
+                let distance = surface.lattice().to_object(sample.position).distance(exact.position);
+                if distance.is_nan() || distance > tolerance {
+                    return Some(format!("face {face}, sub {sub}, uv {uv:?}: {distance} away"));
+                }
+            }
+        }
+    }
+    None
+}
