@@ -1,15 +1,17 @@
 //! `lazytess generate`: control meshes of this program's making, as OBJ.
 
-use crate::error::{Error, Result};
+use super::interrupt::cancel_on_interrupt;
+use super::progress::Progress;
+use crate::error::{Error, ErrorKind, Result};
 use crate::ids::VertexId;
 use crate::io::obj_write::{ObjWriter, write_obj};
 use crate::mesh::shapes::{self, Crowd, Ground, NamedShape, Scan};
 use crate::mesh::{ControlMesh, Corner, Crease, MeshSink};
 use clap::Args;
 use glam::DVec3;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::io;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Write a control mesh of this program's making as OBJ
 ///
@@ -38,6 +40,9 @@ pub struct GenerateArgs {
     quiet: bool,
 }
 
+/// As the help says.
+const DEFAULT_FACES: u64 = 10_000;
+
 /// Face corners are numbered in 31 bits; scans and crowds have up to five percent more faces than asked.
 const MAX_FACES: u64 = 500_000_000;
 
@@ -57,18 +62,27 @@ impl GenerateArgs {
     pub fn run(&self) -> Result<()> {
         let job = self.job()?;
         let comment = format!("made by: lazytess generate {}", self.arguments());
-        let bar = self.progress_bar(&job);
-        write_obj(&self.output, |writer| {
+        let progress = Progress::new("faces", self.quiet || matches!(job, Job::Mesh(_)));
+        let cancel = cancel_on_interrupt()?;
+        let written = write_obj(&self.output, |writer| {
             writer.comment(&comment)?;
+            let n_faces = self.faces.unwrap_or(DEFAULT_FACES) as usize;
+            let mut watched = Watched { writer, progress: &progress, cancel: &cancel, n_faces, done: 0 };
             match &job {
-                Job::Ground(ground) => ground.write(&mut Watched { writer, bar: &bar }),
-                Job::Scan(scan) => scan.write(&mut Watched { writer, bar: &bar }),
-                Job::Crowd(crowd) => crowd.write(&mut Watched { writer, bar: &bar }),
-                Job::Mesh(mesh) => writer.mesh(mesh),
+                Job::Ground(ground) => ground.write(&mut watched),
+                Job::Scan(scan) => scan.write(&mut watched),
+                Job::Crowd(crowd) => crowd.write(&mut watched),
+                Job::Mesh(mesh) => watched.writer.mesh(mesh),
             }
-        })?;
-        bar.finish_and_clear();
-        Ok(())
+        });
+        progress.finish();
+        match written {
+            Err(_) if cancel.load(Ordering::Relaxed) => {
+                let message = format!("interrupted: {} was not written", self.output.display());
+                Err(Error::new(ErrorKind::Interrupted, message))
+            }
+            other => other,
+        }
     }
 
     fn job(&self) -> Result<Job> {
@@ -89,7 +103,7 @@ impl GenerateArgs {
 
     fn sized(&self, job: fn(u64, u64) -> Job) -> Result<Job> {
         self.reject("valence", self.valence.is_some())?;
-        let faces = self.faces.unwrap_or(10_000);
+        let faces = self.faces.unwrap_or(DEFAULT_FACES);
         if faces == 0 || faces > MAX_FACES {
             return Err(Error::input(format!("--faces {faces} cannot be made: choose 1 to {MAX_FACES}")));
         }
@@ -132,31 +146,34 @@ impl GenerateArgs {
         let options = [("faces", self.faces), ("seed", self.seed), ("valence", valence)];
         self.kind.clone() + &options.map(|(name, value)| option(name, value)).concat()
     }
-
-    /// Counts faces; hidden without a terminal.
-    fn progress_bar(&self, job: &Job) -> ProgressBar {
-        if self.quiet || matches!(job, Job::Mesh(_)) {
-            return ProgressBar::hidden();
-        }
-        let bar = ProgressBar::new(self.faces.unwrap_or(10_000));
-        let style = ProgressStyle::with_template("{bar:40} {human_pos}/{human_len} faces, {eta} left");
-        bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-    }
 }
 
-/// A sink that moves the progress bar every so many faces.
+/// A sink that moves the progress bar and listens for Ctrl-C.
 struct Watched<'a, W> {
     writer: &'a mut ObjWriter<W>,
-    bar: &'a ProgressBar,
+    progress: &'a Progress,
+    cancel: &'a AtomicBool,
+    n_faces: usize,
+    done: usize,
 }
 
 impl<W: io::Write> MeshSink for Watched<'_, W> {
     fn vertex(&mut self, position: DVec3) -> io::Result<()> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return Err(io::Error::other("interrupted"));
+        }
         self.writer.vertex(position)
     }
 
     fn face(&mut self, corners: &[VertexId]) -> io::Result<()> {
-        self.bar.inc(1);
+        if self.cancel.load(Ordering::Relaxed) {
+            return Err(io::Error::other("interrupted"));
+        }
+        self.done += 1;
+        if self.done.is_multiple_of(10_000) {
+            // Scans and crowds may end up with a few more faces than asked.
+            self.progress.set(self.done.min(self.n_faces), self.n_faces);
+        }
         self.writer.face(corners)
     }
 

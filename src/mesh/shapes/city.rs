@@ -7,7 +7,7 @@ use super::NamedShape;
 use super::model::Model;
 use super::noise::Random;
 use super::sweep::lathe;
-use crate::mesh::{Assembly, ControlMesh};
+use crate::mesh::{Assembly, BoundaryRule, ControlMesh};
 use glam::{DAffine3, DVec2, DVec3};
 
 /// Blocks along a side of the city.
@@ -18,6 +18,11 @@ const PITCH: f64 = 5.0;
 const HALF_BLOCK: f64 = 2.0;
 /// Height of the pavement above the street.
 const PAVEMENT: f64 = 0.06;
+
+/// Centre of the bay, as (x, z).
+const BAY: DVec2 = DVec2::new(22.0, 24.0);
+/// Where its water ends.
+const BAY_RADIUS: f64 = 10.5;
 
 /// Every mesh of the scene by the stem of its file name.
 pub(super) fn meshes() -> Vec<NamedShape> {
@@ -32,6 +37,8 @@ pub(super) fn meshes() -> Vec<NamedShape> {
         ("city-glass", of_kind(true)),
         ("city-blocks", assembled(blocks.iter().map(|b| (slab(), b.world_from_slab())))),
         ("city-trees", assembled(blocks.iter().flat_map(Block::trees))),
+        ("city-shore", shore()),
+        ("city-sea", sea()),
     ]
 }
 
@@ -58,8 +65,7 @@ impl Block {
 
     /// The city is round, but for a bay.
     fn on_land(&self) -> bool {
-        let bay = DVec2::new(22.0, 24.0);
-        self.center.length() < 34.0 && self.center.distance(bay) > 13.0
+        self.center.length() < 34.0 && self.center.distance(BAY) > BAY_RADIUS + 2.5
     }
 
     fn random(&self, what: u64) -> Random {
@@ -105,6 +111,35 @@ impl Block {
         };
         (0..18).map(tree).collect()
     }
+}
+
+/// The island under the city: one polygon for the streets, with the bay cut out, and a quay around it.
+fn shore() -> ControlMesh {
+    const N: u32 = 64;
+    let mut shore = Model::from_mesh(&super::prism(N));
+    for p in &mut shore.positions {
+        let radius = shore_radius(DVec2::new(p.x, p.z).normalize());
+        *p = DVec3::new(radius * p.x, 0.5 * (p.y - 1.0), radius * p.z);
+    }
+    shore.crease_by_angle(60.0, f32::INFINITY);
+    shore.into_mesh()
+}
+
+/// Distance from the origin to the water in a direction.
+fn shore_radius(direction: DVec2) -> f64 {
+    const ISLAND: f64 = 37.0;
+    let (along, across) = (direction.dot(BAY), direction.perp_dot(BAY));
+    let half_chord = BAY_RADIUS * BAY_RADIUS - across * across;
+    if along > 0.0 && half_chord > 0.0 { ISLAND.min(along - half_chord.sqrt()) } else { ISLAND }
+}
+
+/// A square of water below the streets, up to the horizon.
+fn sea() -> ControlMesh {
+    let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
+    let positions = corners.map(|[x, z]| DVec3::new(4000.0 * x, -0.4, 4000.0 * z)).to_vec();
+    let mut sea = super::polygons(positions, [[0, 1, 2, 3]]);
+    sea.boundary = BoundaryRule::EdgeAndCorner;
+    sea
 }
 
 /// A rounded slab of pavement.
@@ -232,7 +267,7 @@ mod tests {
 
     #[test]
     fn city_parts_are_closed_and_look_outwards() {
-        for (name, part) in meshes() {
+        for (name, part) in meshes().into_iter().filter(|(name, _)| *name != "city-sea") {
             part.validate().unwrap();
             assert!(Edges::of(&part).closed(), "{name}");
             assert!(signed_volume(&part) > 1.0, "{name}");

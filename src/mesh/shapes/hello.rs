@@ -25,6 +25,7 @@ pub(super) fn meshes() -> Vec<NamedShape> {
         ("hello-triangles-catmark", triangulated_torus(TriangleRule::Catmark)),
         ("hello-triangles-smooth", triangulated_torus(TriangleRule::Smooth)),
         ("hello-edit", studded()),
+        ("hello-stage", stage()),
     ]
 }
 
@@ -52,17 +53,18 @@ fn drum() -> ControlMesh {
     drum.into_mesh()
 }
 
-/// A ball with a sharp fold over its top that ends on both sides.
+/// A ball with a sharp fold over its top that ends, as a dart, on both sides.
 fn dart() -> ControlMesh {
     let mut ball = basic::cube_sphere(2);
     let at = |x, y, z| ball.positions.iter().position(|p| p.signum() * p.abs().ceil() == DVec3::new(x, y, z));
-    let path = [at(-1.0, 1.0, 0.0), at(0.0, 1.0, 0.0), at(1.0, 1.0, 0.0)].map(Option::unwrap_or_default);
+    let arc = [[-1.0, 0.0], [-1.0, 1.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]];
+    let path = arc.map(|[x, y]| at(x, y, 0.0).unwrap_or_default());
     for edge in path.windows(2) {
         let edge = [VertexId::from(edge[0]), VertexId::from(edge[1])];
         ball.creases.push(Crease { edge, sharpness: f32::INFINITY });
     }
     ball.positions.iter_mut().for_each(|p| *p *= 1.25);
-    ball.positions[path[1]].y = 1.7;
+    ball.positions[path[2]].y = 1.8;
     ball
 }
 
@@ -133,6 +135,17 @@ fn studded() -> ControlMesh {
     }
 }
 
+/// The stage that the shapes stand on: a sheet that bends up behind them.
+fn stage() -> ControlMesh {
+    let profile = [[14.0, 0.0], [2.0, 0.0], [-9.0, 0.0], [-12.0, 0.4], [-13.5, 2.5], [-14.0, 6.0], [-14.0, 14.0]];
+    let row = |[z, y]: [f64; 2]| [-24.0, -8.0, 8.0, 24.0].map(|x| DVec3::new(x, y, z));
+    let quads = (0..3 * (profile.len() as u32 - 1)).map(|k| {
+        let v = k / 3 * 4 + k % 3;
+        [v, v + 1, v + 5, v + 4]
+    });
+    super::polygons(profile.into_iter().flat_map(row).collect(), quads)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,11 +169,22 @@ mod tests {
     }
 
     #[test]
+    fn stage_faces_up_and_to_the_front() {
+        let stage = stage();
+        for face in stage.faces() {
+            let p = |i: usize| stage.positions[face[i].idx()];
+            let normal = (p(1) - p(0)).cross(p(2) - p(0));
+            assert!(normal.y >= 0.0 && normal.z >= 0.0 && normal.x == 0.0, "{normal}");
+        }
+    }
+
+    #[test]
     fn shapes_have_the_parts_they_are_named_for() {
         assert_eq!(shell().holes.len(), 6);
         let fold = dart();
         let ends: Vec<_> = fold.creases.iter().map(|c| fold.positions[c.edge[1].idx()]).collect();
-        assert_eq!(fold.creases.len(), 2);
-        assert_eq!(ends[0], DVec3::Y * 1.7);
+        assert_eq!(fold.creases.len(), 4);
+        assert_eq!(ends[1], DVec3::Y * 1.8);
+        assert!(ends[3].x > 1.0 && ends[3].y == 0.0);
     }
 }
