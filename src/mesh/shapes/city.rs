@@ -161,6 +161,8 @@ fn tree() -> ControlMesh {
 /// How a tower goes up.
 #[derive(Clone, Copy)]
 enum Style {
+    /// Walls under a hipped roof.
+    House,
     /// Tiers that step back, and a spire.
     Setback,
     /// Storeys between ledges.
@@ -183,19 +185,20 @@ impl Building {
     fn new(center: DVec2, half: f64, random: &mut Random) -> Self {
         // Towers stand downtown, about the origin; houses further out.
         let downtown = (1.0 - center.length() / 30.0).max(0.0);
-        let height =
-            (1.0 + 11.0 * downtown * downtown * random.within(0.4, 1.3)) * half.sqrt() * random.within(0.7, 1.4);
+        let height = (1.1 + 15.0 * downtown.powi(2) * random.within(0.3, 1.3)) * half.sqrt() * random.within(0.7, 1.3);
         let slim = |random: &mut Random| half * random.within(0.75, 1.0);
         let style = match random.below(10) {
-            0..4 => Style::Setback,
-            4..7 => Style::Ledges,
-            7 | 8 => Style::Dome,
+            0 | 1 if height < 4.0 => Style::Dome,
+            _ if height < 2.0 => Style::House,
+            0..5 => Style::Setback,
+            5..8 => Style::Ledges,
             _ => Style::Twisted,
         };
         let glass = match style {
             Style::Twisted => true,
             Style::Dome | Style::Setback => random.chance(0.15),
             Style::Ledges => random.chance(0.4),
+            Style::House => false,
         };
         Self { center, half: DVec2::new(slim(random), slim(random)), height, style, glass }
     }
@@ -206,6 +209,7 @@ impl Building {
 
     fn mesh(&self) -> ControlMesh {
         let (profile, n) = match self.style {
+            Style::House => (house_profile(self.height), 4),
             Style::Setback => (setback_profile(self.height), 4),
             Style::Ledges => (ledge_profile(self.height), 4),
             Style::Twisted => (shaft_profile(self.height), 4),
@@ -219,7 +223,7 @@ impl Building {
         match self.style {
             Style::Twisted => self.twist(&mut tower),
             Style::Dome => {}
-            Style::Setback | Style::Ledges => tower.crease_by_angle(40.0, 3.0),
+            Style::House | Style::Setback | Style::Ledges => tower.crease_by_angle(40.0, 3.0),
         }
         tower.into_mesh()
     }
@@ -230,6 +234,10 @@ impl Building {
             *p = DAffine3::from_rotation_y(1.6 * p.y / self.height).transform_point3(*p);
         }
     }
+}
+
+fn house_profile(h: f64) -> Vec<(f64, f64, f32)> {
+    [(0.9, 0.0), (0.9, 0.55), (1.05, 0.5), (1.05, 0.54), (0.0, 1.0)].map(|(r, y)| (r, y * h, 0.0)).to_vec()
 }
 
 fn setback_profile(h: f64) -> Vec<(f64, f64, f32)> {

@@ -65,6 +65,8 @@ fn dart() -> ControlMesh {
     }
     ball.positions.iter_mut().for_each(|p| *p *= 1.25);
     ball.positions[path[2]].y = 1.8;
+    // Lower shoulders on both sides make the fold stand out.
+    ball.positions.iter_mut().filter(|p| p.y > 0.0 && p.z != 0.0).for_each(|p| p.y *= 0.5);
     ball
 }
 
