@@ -1,6 +1,8 @@
 //! The meshes that ship with the scenes are those that the program makes.
 
+use lazytess::io::obj::read_obj;
 use lazytess::io::obj_write::ObjWriter;
+use lazytess::io::scene_file::read_scene;
 use lazytess::mesh::shapes;
 use std::collections::BTreeSet;
 use std::fs;
@@ -35,4 +37,15 @@ fn no_mesh_ships_that_the_program_does_not_make() {
 fn meshes_of_a_scene_are_small_enough_to_ship() {
     let bytes: u64 = fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().metadata().unwrap().len()).sum();
     assert!(bytes < 4_000_000, "{bytes} bytes");
+}
+
+#[test]
+fn scenes_read_and_their_meshes_are_there() {
+    for scene in ["hello", "chess", "city"] {
+        let description = read_scene(&folder().with_file_name(format!("{scene}.toml"))).unwrap();
+        assert!(description.camera.is_some() && description.lights.len() >= 2, "{scene}");
+        for mesh in description.meshes {
+            assert!(read_obj(&mesh.file).unwrap().warnings.is_empty(), "{}", mesh.file.display());
+        }
+    }
 }

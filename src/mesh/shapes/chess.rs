@@ -249,7 +249,8 @@ pub fn frame() -> ControlMesh {
         vec![4 * k + i, 4 * k + j, 4 * next + j, 4 * next + i]
     });
     let mut frame = Model::new(positions, faces.collect());
-    frame.crease_by_angle(20.0, 4.0);
+    // Flat edges too: the mitres keep the corners of the frame square.
+    frame.crease_by_angle(-1.0, 4.0);
     frame.into_mesh()
 }
 

@@ -136,7 +136,7 @@ fn shore_radius(direction: DVec2) -> f64 {
 /// A square of water below the streets, up to the horizon.
 fn sea() -> ControlMesh {
     let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
-    let positions = corners.map(|[x, z]| DVec3::new(4000.0 * x, -0.4, 4000.0 * z)).to_vec();
+    let positions = corners.map(|[x, z]| DVec3::new(20_000.0 * x, -0.4, 20_000.0 * z)).to_vec();
     let mut sea = super::polygons(positions, [[0, 1, 2, 3]]);
     sea.boundary = BoundaryRule::EdgeAndCorner;
     sea
