@@ -50,16 +50,23 @@ impl<'a> RenderScene<'a> {
         let control_faces = meshes.iter().map(ControlMesh::n_faces).sum();
         let mut seconds = PhaseSeconds { load: watch.seconds().into(), ..Default::default() };
         let watch = Stopwatch::start();
+        let (world, camera) = self.compile(meshes, threads, quiet)?;
+        seconds.prepare = watch.seconds().into();
+        Ok(Prepared { scene: self.scene, settings: self.settings, world, camera, control_faces, seconds })
+    }
+
+    /// Prepares meshes that have been read, and the camera that frames them.
+    pub fn compile(&self, meshes: Vec<ControlMesh>, threads: usize, quiet: bool) -> Result<(World, Camera)> {
         let camera = Camera::new(&self.camera.apply(camera_of(self.scene, &meshes))?);
         let (progress, n) = (Progress::new("meshes prepared", quiet), meshes.len());
         let height = self.settings.size[1];
         let world = compile(self.scene, meshes, &camera, height, threads, &mut |k| progress.set(k, n))?;
         progress.finish();
-        seconds.prepare = watch.seconds().into();
-        Ok(Prepared { scene: self.scene, settings: self.settings, world, camera, control_faces, seconds })
+        Ok((world, camera))
     }
 
-    fn read_meshes(&self, quiet: bool) -> Result<Vec<ControlMesh>> {
+    /// Reads all meshes.
+    pub fn read_meshes(&self, quiet: bool) -> Result<Vec<ControlMesh>> {
         let progress = Progress::new("meshes read", quiet);
         let n = self.scene.meshes.len();
         let read = self.scene.meshes.iter().enumerate().map(|(i, description)| {

@@ -50,6 +50,7 @@ enum Command {
     Sample(sample::SampleArgs),
     Tessellate(tessellate::TessellateArgs),
     Bench(bench::BenchArgs),
+    Info(info::InfoArgs),
     Compare(compare::CompareArgs),
     Generate(generate::GenerateArgs),
 }
@@ -62,6 +63,7 @@ impl Cli {
             Command::Sample(args) => args.run(),
             Command::Tessellate(args) => args.run(),
             Command::Bench(args) => args.run(),
+            Command::Info(args) => args.run(),
             Command::Compare(args) => args.run(),
             Command::Generate(args) => args.run(),
         }

@@ -15,8 +15,17 @@ pub fn resident_bytes() -> Option<u64> {
 }
 
 fn status_bytes(key: &str) -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let value = status.lines().find_map(|line| line.strip_prefix(key))?;
+    bytes_in("/proc/self/status", key)
+}
+
+/// The memory that programs can still get without others being swapped out; `None` where the system does not tell.
+pub fn available_bytes() -> Option<u64> {
+    bytes_in("/proc/meminfo", "MemAvailable:")
+}
+
+fn bytes_in(file: &str, key: &str) -> Option<u64> {
+    let lines = std::fs::read_to_string(file).ok()?;
+    let value = lines.lines().find_map(|line| line.strip_prefix(key))?;
     value.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kb| kb * 1024)
 }
 

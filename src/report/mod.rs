@@ -1,11 +1,15 @@
-//! What a render has cost, in words for people and as JSON for programs.
+//! What a render has cost and what a scene needs, in words for people and as JSON for programs.
 //!
-//! [`RenderStatistics`] is plain data, filled by whoever ran the render. Its JSON keys are an interface: they are
-//! listed in `notes/statistics.md`, and a test compares the list with what is written.
+//! [`RenderStatistics`] and [`Inventory`] are plain data, filled by whoever ran the render or read the scene. Their JSON
+//! keys are an interface: those of a render are listed in `notes/statistics.md`, and a test compares the list with what
+//! is written.
 
+pub mod inventory;
+mod quantity;
 pub mod statistics;
 pub mod summary;
 
+pub use inventory::{CacheAdvice, Inventory};
 pub use statistics::{
     CacheReport, GeometryReport, MemoryReport, PhaseSeconds, PictureReport, RayReport, RenderStatistics, Seconds,
 };

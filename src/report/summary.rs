@@ -1,5 +1,6 @@
 //! The statistics of a render in words.
 
+use super::quantity::{Bytes, Count, plural};
 use super::statistics::{GeometryReport, RenderStatistics, Seconds};
 use std::fmt::{self, Display, Formatter};
 
@@ -95,35 +96,6 @@ fn percent(part: u64, whole: u64) -> String {
     format!("{bounded:.1} %")
 }
 
-fn plural(n: u64, what: &str) -> String {
-    format!("{} {what}{}", Count(n), if n == 1 { "" } else { "s" })
-}
-
-/// A count with thousands apart: `1,234,567`.
-struct Count(u64);
-
-impl Display for Count {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let digits = self.0.to_string();
-        let first = (digits.len() - 1) % 3 + 1;
-        f.write_str(&digits[..first])?;
-        digits.as_bytes()[first..].chunks(3).try_for_each(|group| write!(f, ",{}", String::from_utf8_lossy(group)))
-    }
-}
-
-/// A number of bytes in the binary units that sizes are typed in: `1.5 GiB`.
-struct Bytes(u64);
-
-impl Display for Bytes {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let units = [(1u64 << 40, "TiB"), (1 << 30, "GiB"), (1 << 20, "MiB"), (1 << 10, "KiB")];
-        match units.into_iter().find(|&(size, _)| self.0 >= size) {
-            Some((size, unit)) => write!(f, "{:.1} {unit}", self.0 as f64 / size as f64),
-            None => write!(f, "{} bytes", self.0),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -161,10 +133,7 @@ seconds   2.00: load 0.00, prepare 0.00, render 2.00, write 0.00; 2 threads
     }
 
     #[test]
-    fn sizes_and_counts_are_read_easily() {
-        let counts = [0, 999, 1000, 1_234_567].map(|n| Count(n).to_string());
-        assert_eq!(counts, ["0", "999", "1,000", "1,234,567"]);
-        assert_eq!([1023, 1536, 3 << 29].map(|n| Bytes(n).to_string()), ["1023 bytes", "1.5 KiB", "1.5 GiB"]);
+    fn shares_are_whole_only_if_nothing_is_missing() {
         assert_eq!([percent(1, 100_000), percent(0, 0), percent(7, 7)], ["0.1 %", "0.0 %", "100.0 %"]);
     }
 }

@@ -46,7 +46,7 @@ pub struct WorldMesh {
 }
 
 /// What the full tessellation would take.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct FullTessellation {
     /// Patches with a surface.
     pub patches: u64,
@@ -220,7 +220,8 @@ impl WorldMesh {
         self.surface.patch_rates(patch, &|a, b| self.rate.edge_rate(world(a), world(b)))
     }
 
-    fn bytes(&self) -> usize {
+    /// Bytes held, for the whole render.
+    pub fn bytes(&self) -> usize {
         let tex_coords = self.tex_coords.as_ref().map_or(0, |t| 8 * t.values.len() + 4 * t.indices.len());
         let visible = self.visible.as_ref().map_or(0, |v| 4 * v.len());
         self.surface.bytes() + self.top.bytes() + tex_coords + visible

@@ -171,10 +171,15 @@ impl Surface {
         Point::new(f64::from(x), f64::from(y), f64::from(z))
     }
 
+    /// Bytes of the control points.
+    pub fn control_bytes(&self) -> usize {
+        12 * self.control.len()
+    }
+
     /// Bytes held, the plan library included.
     pub fn bytes(&self) -> usize {
         self.topology.bytes()
-            + 12 * self.control.len()
+            + self.control_bytes()
             + self.library.bytes()
             + 4 * self.plan_of_face.len()
             + self.first_patch.as_ref().map_or(0, |f| 4 * f.len())

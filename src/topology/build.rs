@@ -37,7 +37,7 @@ pub struct Topology {
 }
 
 /// Counts for reports.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct MeshCounts {
     /// Edges with one face.
     pub boundary_edges: usize,

@@ -1,6 +1,7 @@
 //! Readers for the reference data in `../shared`, for tests that run only where it is.
 #![allow(dead_code)]
 
+pub mod brute_force;
 pub mod limit_table;
 
 use std::path::PathBuf;

@@ -1,0 +1,178 @@
+//! Lazy tracing answers as if everything had been tessellated beforehand, whatever the cache holds.
+
+mod common;
+
+use common::brute_force::BruteForce;
+use glam::{DAffine3, DMat3, DQuat, DVec3};
+use lazytess::cache::CacheConfig;
+use lazytess::ids::MeshId;
+use lazytess::math::{DBounds, Hit, Intersect, Ray};
+use lazytess::mesh::{ControlMesh, shapes};
+use lazytess::scene::intersect::Intersector;
+use lazytess::scene::rate::DicingRate;
+use lazytess::scene::world::{GridCache, World, WorldMesh};
+
+/// Triangle tests that a comparison may cost.
+const BUDGET: usize = 1_000_000;
+
+/// xorshift64*: small, seeded, the same everywhere.
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 * 2f64.powi(-53)
+    }
+
+    fn in_cube(&mut self) -> DVec3 {
+        DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
+    }
+
+    /// From around the box, or from within, through it.
+    fn ray(&mut self, bounds: DBounds) -> Ray {
+        let half = 0.5 * (bounds.max - bounds.min);
+        let [from, to] = [self.in_cube(), self.in_cube()].map(|p| bounds.center() + p * half);
+        let away = if self.unit() < 0.3 { 0.0 } else { bounds.diagonal() * (1.0 + 9.0 * self.unit()) };
+        let origin = from + self.in_cube().normalize_or(DVec3::X) * away;
+        Ray::new(origin, (to - origin) * (0.01 + self.unit()))
+    }
+}
+
+fn world_of(parts: Vec<(ControlMesh, DAffine3, DicingRate)>) -> World {
+    World::new(parts.into_iter().map(|(mesh, place, rate)| WorldMesh::new(mesh, place, rate, 1).unwrap()).collect())
+}
+
+fn cache_of(world: &World, config: CacheConfig) -> GridCache {
+    GridCache::new(world, config).unwrap()
+}
+
+/// Traces random rays and the ones that go on from their hits.
+fn compare(name: &str, world: &World) {
+    let truth = BruteForce::new(world);
+    let caches = [CacheConfig::unbounded(64 << 20), CacheConfig::with_bytes(64 << 10), CacheConfig::with_bytes(0)]
+        .map(|config| cache_of(world, config));
+    let mut tracers = caches.each_ref().map(|cache| Intersector::new(world, cache));
+    let bounds = world.meshes().iter().map(WorldMesh::bounds_in_world).fold(DBounds::EMPTY, DBounds::union);
+    let n_rays = (BUDGET / truth.n_triangles().max(1)).clamp(20, 400);
+    let (mut random, mut n_hits) = (Random(0x5eed_0001), 0);
+    for i in 0..n_rays {
+        let ray = random.ray(bounds);
+        let hit = answer(name, i, &mut tracers, &truth, &ray);
+        if let Some(hit) = hit {
+            n_hits += 1;
+            let origin = ray.origin + f64::from(hit.t) * ray.direction;
+            let onward = Ray { from: Some(hit.primitive), ..Ray::new(origin, random.in_cube()) };
+            answer(name, i, &mut tracers, &truth, &onward);
+        }
+    }
+    assert!(n_hits > n_rays / 20, "{name}: only {n_hits} of {n_rays} rays hit anything, so little was compared");
+}
+
+/// The first tracer's answer, after checking that all agree and that it is right.
+fn answer(name: &str, i: usize, tracers: &mut [Intersector<'_>], truth: &BruteForce<'_>, ray: &Ray) -> Option<Hit> {
+    let hits: Vec<Option<Hit>> = tracers.iter_mut().map(|tracer| tracer.closest(ray)).collect();
+    // Debug output names every bit of an f32.
+    let told: Vec<String> = hits.iter().map(|hit| format!("{hit:?}")).collect();
+    assert!(told.iter().all(|t| *t == told[0]), "{name}, ray {i}, {ray:?}: caches disagree: {told:#?}");
+    for tracer in tracers {
+        assert_eq!(tracer.occluded(ray), hits[0].is_some(), "{name}, ray {i}, {ray:?}: occlusion and {}", told[0]);
+    }
+    if let Some(wrong) = truth.objection(ray, hits[0].as_ref()) {
+        panic!("{name}, ray {i}, {ray:?}: {}: {wrong}", told[0]);
+    }
+    hits[0]
+}
+
+/// Pieces of about the given part of the mesh's size, seen from a corner of its box: every edge has its own rate.
+fn uneven(mesh: &ControlMesh, pieces: f64) -> DicingRate {
+    let bounds = mesh.bounds();
+    let eye = bounds.max + 0.1 * (bounds.max - bounds.min);
+    DicingRate::Pixels { eye, pieces_per_unit: pieces }
+}
+
+#[test]
+fn every_shape_at_even_and_odd_rates() {
+    for (name, mesh) in shapes::all() {
+        for rate in [1, 2, 7, 11] {
+            let world = world_of(vec![(mesh.clone(), DAffine3::IDENTITY, DicingRate::Fixed(rate))]);
+            compare(&format!("{name} at fixed:{rate}"), &world);
+        }
+    }
+}
+
+#[test]
+fn every_shape_where_each_edge_has_its_own_rate() {
+    for (name, mesh) in shapes::all() {
+        for pieces in [1.3, 4.0] {
+            let rate = uneven(&mesh, pieces);
+            compare(&format!("{name}, uneven {pieces}"), &world_of(vec![(mesh.clone(), DAffine3::IDENTITY, rate)]));
+        }
+    }
+}
+
+#[test]
+fn patches_of_many_pieces_and_levels() {
+    for (name, mesh, rate) in [
+        ("cube", shapes::cube(), 33),
+        ("crease-cube-2.5", shapes::crease_cube(2.5), 65),
+        ("heptagon", shapes::n_gon(7), 75),
+        ("quad", shapes::n_gon(4), 200),
+    ] {
+        compare(
+            &format!("{name} at fixed:{rate}"),
+            &world_of(vec![(mesh, DAffine3::IDENTITY, DicingRate::Fixed(rate))]),
+        );
+    }
+}
+
+#[test]
+fn meshes_that_are_turned_stretched_and_mirrored() {
+    let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7);
+    let mirror = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+    let places = [
+        DAffine3::from_scale_rotation_translation(DVec3::new(0.2, 3.0, 1.0), turn, DVec3::new(1.0, 0.5, 0.0)),
+        DAffine3::from_mat3_translation(mirror, DVec3::new(-0.3, 0.2, 0.4)),
+        DAffine3::from_scale_rotation_translation(DVec3::new(5.0, -0.7, 0.01), turn.inverse(), DVec3::ZERO),
+        DAffine3::from_translation(DVec3::new(0.4, -0.5, 0.2)),
+    ];
+    let meshes =
+        [shapes::torus(8, 6, 2.0, 0.75), shapes::crease_cube(1.0), shapes::cube_sphere(3), shapes::globe(5, 4)];
+    let parts = |rate: u32| {
+        let together = meshes.iter().cloned().zip(places).enumerate();
+        together.map(|(i, (mesh, place))| (mesh, place, DicingRate::Fixed(rate + i as u32))).collect()
+    };
+    for rate in [1, 4, 9] {
+        compare(&format!("four meshes at fixed:{rate} and more"), &world_of(parts(rate)));
+    }
+}
+
+#[test]
+fn far_away_and_tiny_or_huge_meshes() {
+    for (scale, offset) in [(1e-6, 0.0), (1e6, 0.0), (1.0, 1e7), (1e-3, 1e5), (1e6, 1e7)] {
+        let place = DAffine3::from_scale_rotation_translation(
+            DVec3::splat(scale),
+            DQuat::from_rotation_y(0.4),
+            DVec3::new(offset, -0.3 * offset, 0.7 * offset),
+        );
+        let world = world_of(vec![(shapes::cube_sphere(3), place, DicingRate::Fixed(5))]);
+        compare(&format!("scale {scale}, offset {offset}"), &world);
+    }
+}
+
+#[test]
+fn mesh_that_is_hit_is_the_one_in_front() {
+    let sphere = |z: f64| (shapes::cube_sphere(3), DAffine3::from_translation(z * DVec3::Z), DicingRate::Fixed(4));
+    let world = world_of(vec![sphere(0.0), sphere(10.0), sphere(-10.0)]);
+    let cache = cache_of(&world, CacheConfig::with_bytes(1 << 20));
+    let mut tracer = Intersector::new(&world, &cache);
+    let mut front = |z: f64, dz: f64| {
+        let ray = Ray::new(DVec3::new(0.01, 0.02, z), DVec3::new(0.0, 0.0, dz));
+        tracer.closest(&ray).map(|hit| hit.primitive.mesh)
+    };
+    assert_eq!(front(100.0, -1.0), Some(MeshId(1)));
+    assert_eq!(front(-100.0, 1.0), Some(MeshId(2)));
+    assert_eq!(front(5.0, -1.0), Some(MeshId(0)));
+    assert_eq!(front(100.0, 1.0), None);
+}
