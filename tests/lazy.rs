@@ -95,7 +95,7 @@ fn uneven(mesh: &ControlMesh, pieces: f64) -> DicingRate {
 #[test]
 fn every_shape_at_even_and_odd_rates() {
     for (name, mesh) in shapes::all() {
-        for rate in [1, 2, 7, 11] {
+        for rate in [1, 4, 11] {
             let world = world_of(vec![(mesh.clone(), DAffine3::IDENTITY, DicingRate::Fixed(rate))]);
             compare(&format!("{name} at fixed:{rate}"), &world);
         }
