@@ -47,7 +47,7 @@ pub struct Hit {
     pub face: FaceId,
     /// Which sub-quad of an n-gon; 0 for quads.
     pub sub: u32,
-    /// Patch parameters in [0,1].
+    /// Patch parameters in 0..=1.
     pub u: f32,
     /// See `u`.
     pub v: f32,

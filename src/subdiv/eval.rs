@@ -136,7 +136,7 @@ fn exact_corner(u: f64, v: f64) -> Option<usize> {
 }
 
 impl Evaluator {
-    /// Positions at all pairs of `us` and `vs` (each ascending, in [0,1]) of the patch that starts at `node` with ring
+    /// Positions at all pairs of `us` and `vs` (each ascending, in 0..=1) of the patch that starts at `node` with ring
     /// points `ring`; `out[j * us.len() + i]` is at `(us[i], vs[j])`.
     pub fn grid(
         &mut self,
@@ -194,12 +194,10 @@ impl Evaluator {
         if single || depth >= MAX_DEPTH {
             let (u, v) = (self.params[target.us.0], self.params[target.vs.0]);
             let corner = if depth >= MAX_DEPTH { exact_corner(u.round(), v.round()) } else { exact_corner(u, v) };
-            if let Some(limit) = corner.and_then(|k| limits.get(k)) {
-                if let Limit::Position(rows) | Limit::Smooth(rows) = limit {
-                    let p = product(rows, 0, &self.points[ring..]);
-                    self.fill(target, p, out);
-                    return;
-                }
+            if let Some(Limit::Position(rows) | Limit::Smooth(rows)) = corner.and_then(|k| limits.get(k)) {
+                let p = product(rows, 0, &self.points[ring..]);
+                self.fill(target, p, out);
+                return;
             }
         }
         let refined = self.refine(rows, ring);

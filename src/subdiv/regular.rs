@@ -5,7 +5,7 @@ use super::eval::Point;
 /// 16 control points, u fastest; the patch lies between `[5]`, `[6]`, `[9]` and `[10]`.
 pub type ControlPoints = [Point; 16];
 
-/// Values of the four cubic B-spline basis functions at `t` in [0,1].
+/// Values of the four cubic B-spline basis functions at `t` in 0..=1.
 #[inline(always)]
 pub fn basis(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
@@ -54,7 +54,7 @@ fn bezier_weights(a: f64, b: f64) -> [[f64; 4]; 4] {
     [blossom(a, a, a), blossom(a, a, b), blossom(a, b, b), blossom(b, b, b)]
 }
 
-/// The 16 Bézier points of the part [u0,u1] x [v0,v1]; their convex hull holds that part of the patch.
+/// The 16 Bézier points of the part `[u0, u1] x [v0, v1]`; their convex hull holds that part of the patch.
 pub fn bezier_points(c: &ControlPoints, [u0, u1]: [f64; 2], [v0, v1]: [f64; 2]) -> ControlPoints {
     let (wu, wv) = (bezier_weights(u0, u1), bezier_weights(v0, v1));
     let mut out = [Point::ZERO; 16];
