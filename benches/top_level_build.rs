@@ -49,20 +49,14 @@ impl Task for Walk<'_> {
             let [from, to] = [0.618_033_988_7, 0.754_877_666_2].map(|x| DVec3::new(at(0, x), at(1, x), at(2, x)));
             let ray = LatticeRay::new(from, to - from, f32::INFINITY, TriangleId::NONE);
             let (origin, direction) = (from.as_vec3(), (to - from).as_vec3());
-            self.tree.closest(
-                kernel,
-                &ray,
-                &mut stack,
-                |_| {},
-                |leaf, t_max| {
-                    n_leaves += 1;
-                    let b = self.boxes[leaf.patch.idx()];
-                    let nearest = nearest(origin, direction, b.center());
-                    if nearest.distance(b.center()) < 0.3 * b.diagonal() {
-                        *t_max = t_max.min(nearest.distance(origin) / (to - from).as_vec3().abs().max_element());
-                    }
-                },
-            );
+            self.tree.closest(kernel, &ray, &mut stack, |leaf, t_max| {
+                n_leaves += 1;
+                let b = self.boxes[leaf.patch.idx()];
+                let nearest = nearest(origin, direction, b.center());
+                if nearest.distance(b.center()) < 0.3 * b.diagonal() {
+                    *t_max = t_max.min(nearest.distance(origin) / (to - from).as_vec3().abs().max_element());
+                }
+            });
         }
         n_leaves
     }

@@ -105,6 +105,12 @@ impl LatticeRay {
         if t.is_finite() { t.min(f64::from(f32::MAX)) as f32 } else { f32::INFINITY }
     }
 
+    /// The inverse of [`Self::caller_t`], rounded up so that nothing at `t` or before lies beyond it.
+    pub fn not_below(&self, t: f32) -> f32 {
+        let inner = f64::from(t) / self.t_unit - self.t_start;
+        (inner + inner.abs() * 1e-6 + self.t_start.abs() * 1e-12) as f32
+    }
+
     /// Where the ray ends, in lattice space's units of t; negative for a ray that hits nothing.
     #[inline(always)]
     pub fn t_max(&self) -> f32 {

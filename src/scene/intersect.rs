@@ -218,14 +218,14 @@ impl Task for ClosestInMesh<'_, '_> {
         let mesh = world.mesh(id);
         let table = cache.table(id);
         let visit = pin.visit();
-        let prefetch = |slot| visit.prefetch(visit.root(table, SlotId(slot)));
-        mesh.top().closest(kernel, ray, &mut stacks.mesh, prefetch, |leaf, t_max| {
+        let mut walk = mesh.top().walk(&mut stacks.mesh);
+        while let Some(leaf) = walk.nearest(kernel, ray, hit.t, |slot| visit.prefetch(visit.root(table, SlotId(slot))))
+        {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
             let root = builder.fetch_root(&visit, slot, of, || cache.touch(id, leaf.slot));
             closest_in_patch(kernel, builder, &visit, root, of, ray, hit);
-            *t_max = hit.t;
-        });
+        }
     }
 }
 
@@ -281,13 +281,16 @@ impl Task for OccludedInMesh<'_, '_> {
         let mesh = world.mesh(id);
         let table = cache.table(id);
         let visit = pin.visit();
-        let prefetch = |slot| visit.prefetch(visit.root(table, SlotId(slot)));
-        mesh.top().occluded(kernel, ray, &mut stacks.mesh, prefetch, |leaf| {
+        let mut walk = mesh.top().walk(&mut stacks.mesh);
+        while let Some(leaf) = walk.any(kernel, ray, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
             let root = builder.fetch_root(&visit, slot, of, || cache.touch(id, leaf.slot));
-            occluded_in_patch(kernel, builder, &visit, root, of, ray)
-        })
+            if occluded_in_patch(kernel, builder, &visit, root, of, ray) {
+                return true;
+            }
+        }
+        false
     }
 }
 
@@ -435,15 +438,12 @@ impl Intersect for Intersector<'_> {
         let scene_ray = self.scene_ray(ray);
         let world = self.world;
         let mut stack = std::mem::take(&mut self.stacks.scene);
-        world.top().closest(
-            simd::Portable,
-            &scene_ray,
-            &mut stack,
-            |_| (),
-            |leaf, _| {
-                self.closest_in_mesh(MeshId(leaf.patch.0), ray, &mut best);
-            },
-        );
+        world.top().closest(simd::Portable, &scene_ray, &mut stack, |leaf, t_max| {
+            self.closest_in_mesh(MeshId(leaf.patch.0), ray, &mut best);
+            if let Some(hit) = best {
+                *t_max = scene_ray.not_below(hit.t);
+            }
+        });
         self.stacks.scene = stack;
         best
     }
@@ -459,13 +459,9 @@ impl Intersect for Intersector<'_> {
         let scene_ray = self.scene_ray(ray);
         let world = self.world;
         let mut stack = std::mem::take(&mut self.stacks.scene);
-        let hit = world.top().occluded(
-            simd::Portable,
-            &scene_ray,
-            &mut stack,
-            |_| (),
-            |leaf| occluded_by(self, MeshId(leaf.patch.0)),
-        );
+        let hit = world
+            .top()
+            .occluded(simd::Portable, &scene_ray, &mut stack, |leaf| occluded_by(self, MeshId(leaf.patch.0)));
         self.stacks.scene = stack;
         hit
     }

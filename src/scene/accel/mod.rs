@@ -21,12 +21,13 @@
 //! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs). Read `traverse.rs` first.
 
 mod build;
+mod collapse;
 mod traverse;
 
 use crate::ids::PatchId;
 
 pub use build::BUILD_BYTES_PER_PATCH;
-pub use traverse::TraversalStack;
+pub use traverse::{TraversalStack, Walk};
 
 /// A leaf of the tree.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -39,12 +39,12 @@ impl Task for Visits<'_> {
     fn run<K: Kernel>(self, kernel: K) -> Vec<LeafRef> {
         let mut stack = TraversalStack::default();
         let (mut nearest_first, mut unordered) = (vec![], vec![]);
-        self.0.closest(kernel, self.1, &mut stack, |_| {}, |leaf, _| nearest_first.push(leaf));
+        self.0.closest(kernel, self.1, &mut stack, |leaf, _| nearest_first.push(leaf));
         let collect = |leaf| {
             unordered.push(leaf);
             false
         };
-        assert!(!self.0.occluded(kernel, self.1, &mut stack, |_| {}, collect));
+        assert!(!self.0.occluded(kernel, self.1, &mut stack, collect));
         unordered.sort_unstable_by_key(|l| l.slot);
         let mut sorted = nearest_first.clone();
         sorted.sort_unstable_by_key(|l| l.slot);
@@ -126,20 +126,14 @@ fn leaves_beyond_a_hit_are_not_visited() {
         let ray = ray(random_point(i, 8e6), random_point(i + 1000, 1.0));
         let direction = DVec3::from_array(ray.inv.map(|x| 1.0 / f64::from(x)));
         let origin = DVec3::from_array(ray.origin.map(f64::from));
-        tree.closest(
-            Portable,
-            &ray,
-            &mut stack,
-            |_| {},
-            |leaf, t_max| {
-                let t = entry(&boxes[leaf.patch.idx()].expanded(64.0), origin, direction).expect("the box is met");
-                assert!(t <= f64::from(*t_max) + 64.0, "{t} beyond {t_max}");
-                n_visits[0] += 1;
-                if leaf.patch.0.is_multiple_of(3) {
-                    *t_max = t_max.min(t as f32 + 1e5);
-                }
-            },
-        );
+        tree.closest(Portable, &ray, &mut stack, |leaf, t_max| {
+            let t = entry(&boxes[leaf.patch.idx()].expanded(64.0), origin, direction).expect("the box is met");
+            assert!(t <= f64::from(*t_max) + 64.0, "{t} beyond {t_max}");
+            n_visits[0] += 1;
+            if leaf.patch.0.is_multiple_of(3) {
+                *t_max = t_max.min(t as f32 + 1e5);
+            }
+        });
         n_visits[1] += run(Visits(&tree, &ray)).len();
     }
     assert!(2 * n_visits[0] < n_visits[1], "hits hide little: {n_visits:?}");
@@ -153,7 +147,7 @@ fn occlusion_stops_at_the_first_hit() {
         n_visits += 1;
         true
     };
-    assert!(tree.occluded(Portable, &ray(DVec3::ZERO, DVec3::ONE), &mut TraversalStack::default(), |_| {}, first));
+    assert!(tree.occluded(Portable, &ray(DVec3::ZERO, DVec3::ONE), &mut TraversalStack::default(), first));
     assert_eq!(n_visits, 1);
 }
 

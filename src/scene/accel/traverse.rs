@@ -25,53 +25,41 @@ fn t_of(entry: Entry) -> f32 {
 }
 
 impl TopLevel {
-    /// Calls `visit` for the patches whose boxes the ray meets, the nearest of each node first, until the rest lie beyond `t_max`. It is given as [`LatticeRay::t_max`]
-    /// and `visit` makes it smaller when it hits something. `prefetch` is called with a leaf's slot when the leaf is found, some time before its visit.
+    /// A walk along a ray, at its start.
     #[inline(always)]
+    pub fn walk<'t>(&'t self, stack: &'t mut TraversalStack) -> Walk<'t> {
+        let entries = stack.empty(self.stack_need);
+        entries.push(entry(0.0, 0));
+        Walk { tree: self, stack: entries }
+    }
+
+    /// Calls `visit` for the patches whose boxes the ray meets, the nearest of each node first, until the rest lie beyond
+    /// `t_max`. It is given as [`LatticeRay::t_max`] and `visit` makes it smaller when it hits something.
     pub fn closest<K: Kernel>(
         &self,
         kernel: K,
         ray: &LatticeRay,
         stack: &mut TraversalStack,
-        prefetch: impl Fn(u32),
         mut visit: impl FnMut(LeafRef, &mut f32),
     ) {
         let mut t_max = ray.t_max;
-        let stack = stack.empty(self.stack_need);
-        let mut next = Some(entry(0.0, 0));
-        while let Some(current) = next {
-            let target = current as u32;
-            if t_of(current) > t_max {
-                next = stack.pop();
-            } else if target & LEAF != 0 {
-                visit(self.leaf(target), &mut t_max);
-                next = stack.pop();
-            } else {
-                let first = stack.len();
-                self.push_children(kernel, ray, t_max, target, stack, &prefetch);
-                sort_descending(&mut stack[first..]);
-                next = stack.pop();
-            }
+        let mut walk = self.walk(stack);
+        while let Some(leaf) = walk.nearest(kernel, ray, t_max, |_| ()) {
+            visit(leaf, &mut t_max);
         }
     }
 
     /// Calls `visit` for the patches whose boxes the ray meets, in any order, until it says `true`: then so does this.
-    #[inline(always)]
     pub fn occluded<K: Kernel>(
         &self,
         kernel: K,
         ray: &LatticeRay,
         stack: &mut TraversalStack,
-        prefetch: impl Fn(u32),
         mut visit: impl FnMut(LeafRef) -> bool,
     ) -> bool {
-        let stack = stack.empty(self.stack_need);
-        stack.push(entry(0.0, 0));
-        while let Some(current) = stack.pop() {
-            let target = current as u32;
-            if target & LEAF == 0 {
-                self.push_children(kernel, ray, ray.t_max, target, stack, &prefetch);
-            } else if visit(self.leaf(target)) {
+        let mut walk = self.walk(stack);
+        while let Some(leaf) = walk.any(kernel, ray, |_| ()) {
+            if visit(leaf) {
                 return true;
             }
         }
@@ -115,6 +103,54 @@ impl TopLevel {
         let slot = target & !LEAF;
         let reference = self.nodes[slot as usize / LANES].refs[slot as usize % LANES];
         LeafRef { slot, patch: PatchId(reference & !LEAF) }
+    }
+}
+
+/// A ray's way through the tree, from leaf to leaf.
+///
+/// It hands out leaves instead of calling back: code with vector instructions in a closure would be compiled without them.
+pub struct Walk<'t> {
+    tree: &'t TopLevel,
+    stack: &'t mut Vec<Entry>,
+}
+
+impl Walk<'_> {
+    /// The next patch whose box the ray meets before `t_max`, the nearest of each node first. `prefetch` is called with a
+    /// leaf's slot when the leaf is found, some time before it is handed out.
+    #[inline(always)]
+    pub fn nearest<K: Kernel>(
+        &mut self,
+        kernel: K,
+        ray: &LatticeRay,
+        t_max: f32,
+        prefetch: impl Fn(u32),
+    ) -> Option<LeafRef> {
+        while let Some(current) = self.stack.pop() {
+            let target = current as u32;
+            if t_of(current) > t_max {
+                continue;
+            }
+            if target & LEAF != 0 {
+                return Some(self.tree.leaf(target));
+            }
+            let first = self.stack.len();
+            self.tree.push_children(kernel, ray, t_max, target, self.stack, &prefetch);
+            sort_descending(&mut self.stack[first..]);
+        }
+        None
+    }
+
+    /// The next patch whose box the ray meets, in any order.
+    #[inline(always)]
+    pub fn any<K: Kernel>(&mut self, kernel: K, ray: &LatticeRay, prefetch: impl Fn(u32)) -> Option<LeafRef> {
+        while let Some(current) = self.stack.pop() {
+            let target = current as u32;
+            if target & LEAF != 0 {
+                return Some(self.tree.leaf(target));
+            }
+            self.tree.push_children(kernel, ray, ray.t_max, target, self.stack, &prefetch);
+        }
+        None
     }
 }
 
