@@ -30,14 +30,9 @@ fn seeds() -> Range<u64> {
     range.map_or(0..150, |(a, b)| a.parse().expect("START..END")..b.parse().expect("START..END"))
 }
 
-/// Seeds whose meshes the diced surface gets wrong. Two causes:
-/// under boundary rule `None`, an edge from a vertex to itself is a boundary edge and hides the faces at the vertex;
-/// an inner vertex of a fin of doubled faces has its second sharp edge outside the ring of the face that is evaluated.
-const KNOWN: &[u64] = &[1, 24, 33, 74, 89, 126, 129];
-
 #[test]
 fn diced_surface_is_the_reference_surface_on_random_meshes() {
-    for seed in seeds().filter(|seed| !KNOWN.contains(seed)) {
+    for seed in seeds() {
         let mesh = random_mesh(seed);
         if difference(&mesh).is_some() {
             let smallest = shrink(mesh, |m| difference(m).is_some());
@@ -45,12 +40,6 @@ fn diced_surface_is_the_reference_surface_on_random_meshes() {
             panic!("seed {seed}: {why}\n{}", as_test(&smallest, &format!("seed_{seed}")));
         }
     }
-}
-
-#[test]
-fn known_differences_are_still_there() {
-    let mended: Vec<_> = KNOWN.iter().filter(|&&seed| difference(&random_mesh(seed)).is_none()).collect();
-    assert!(mended.is_empty(), "{mended:?} agree now: take them off the list of known differences");
 }
 
 /// Where and how the two evaluations differ, if they do; a panic is a difference too.

@@ -21,6 +21,9 @@ pub struct LocalMesh {
     pub sharpness: Vec<f32>,
     /// Tags per vertex; only those of the target's corners are complete, others are read for their semi-sharp edges.
     pub tags: Vec<VertexTags>,
+    /// Corners of the target that are inner vertices of fins, with the ends of their two sharp edges. Such an end may be
+    /// a vertex without any half-edge here.
+    pub fins: Vec<(u32, [u32; 2])>,
 }
 
 /// A ring and where its vertices come from.
@@ -56,6 +59,11 @@ impl HalfEdges for LocalMesh {
 
     fn vertex_tags(&self, h: u32) -> VertexTags {
         self.tags[self.vertex[h as usize] as usize].clone()
+    }
+
+    fn crease_ends(&self, h: u32) -> Option<[u32; 2]> {
+        let v = self.vertex[h as usize];
+        self.fins.iter().find(|fin| fin.0 == v).map(|fin| fin.1)
     }
 }
 
@@ -117,6 +125,7 @@ impl LocalMesh {
         key.extend(
             self.sharpness.iter().enumerate().filter(|(_, s)| **s > 0.0).flat_map(|(h, s)| [h as u32, s.to_bits()]),
         );
+        key.extend(self.fins.iter().flat_map(|&(v, [a, b])| [u32::MAX - 1, v, a, b]));
         for (v, tags) in self.tags.iter().enumerate() {
             if *tags != VertexTags::default() {
                 key.extend([u32::MAX, v as u32, tags.sharpness.to_bits(), tags.n_infinite]);
@@ -172,7 +181,7 @@ impl<M: HalfEdges + ?Sized> Extractor<'_, M> {
     fn finish(self, corner_tags: &[VertexTags], outer_tags: bool) -> Extracted {
         let mut mesh = LocalMesh { face_start: vec![0], ..Default::default() };
         let mut half_edges = Vec::new();
-        let mut sources = Vec::new();
+        let mut sources: Vec<u32> = Vec::new();
         let mut local_vertex = FxHashMap::default();
         for (place, &start) in self.starts.iter().enumerate() {
             let mut h = start;
@@ -190,6 +199,17 @@ impl<M: HalfEdges + ?Sized> Extractor<'_, M> {
                 }
             }
             mesh.face_start.push(half_edges.len() as u32);
+        }
+        for (k, &corner) in half_edges[..corner_tags.len()].iter().enumerate() {
+            if let Some(ends) = self.source.crease_ends(corner) {
+                let local = ends.map(|v| {
+                    *local_vertex.entry(v).or_insert_with(|| {
+                        sources.push(v);
+                        sources.len() as u32 - 1
+                    })
+                });
+                mesh.fins.push((mesh.vertex[k], local));
+            }
         }
         mesh.twin = half_edges.iter().map(|&h| self.local(&mesh, self.source.twin(h))).collect();
         self.set_tags(&mut mesh, &half_edges, sources.len(), corner_tags, outer_tags);

@@ -5,7 +5,7 @@
 
 use super::local::LocalMesh;
 use crate::mesh::{CreaseMethod, TriangleRule};
-use crate::topology::{HalfEdges, NONE, VertexTags};
+use crate::topology::{Fan, HalfEdges, NONE, VertexTags};
 use std::f64::consts::PI;
 
 /// A weighted sum of points; points may repeat until [`merge`] adds them up.
@@ -146,8 +146,8 @@ pub fn vertex_point(rules: &RuleSet, mesh: &LocalMesh, h: u32) -> Row {
         match mask {
             Mask::Corner => vec![(v, 1.0)],
             Mask::Crease => {
-                let ends = edges.iter().filter(|e| is_sharp(e.0)).map(|e| (e.1, 0.125));
-                std::iter::once((v, 0.75)).chain(ends).collect()
+                let ends = crease_ends(mesh, h, &edges, is_sharp);
+                std::iter::once((v, 0.75)).chain(ends.into_iter().map(|end| (end, 0.125))).collect()
             }
             Mask::Smooth => smooth_vertex(mesh, v, &fan.spokes, &edges),
         }
@@ -162,6 +162,14 @@ pub fn vertex_point(rules: &RuleSet, mesh: &LocalMesh, h: u32) -> Row {
     let mut row: Row = scaled(&before, w).collect();
     row.extend(scaled(&after_row, 1.0 - w));
     merge(row)
+}
+
+/// The far ends of a crease vertex's two sharp edges.
+fn crease_ends(mesh: &LocalMesh, h: u32, edges: &[(u32, u32)], is_sharp: &dyn Fn(u32) -> bool) -> Vec<u32> {
+    match mesh.crease_ends(h) {
+        Some(ends) => ends.to_vec(),
+        None => edges.iter().filter(|e| is_sharp(e.0)).map(|e| e.1).collect(),
+    }
 }
 
 /// The mean, at most 1, of the sharpness values that decay to nothing in this step.
@@ -232,7 +240,8 @@ pub fn corner_limit(mesh: &LocalMesh, h: u32) -> CornerLimit {
     let edges = mesh.fan_edges(&fan);
     match (tags.n_infinite, fan.spokes.len()) {
         (2, _) => {
-            let ends = edges.iter().filter(|e| mesh.edge_sharpness(e.0) > 0.0).map(|e| (e.1, 1.0 / 6.0));
+            let ends = crease_ends(mesh, h, &edges, &|e| mesh.edge_sharpness(e) > 0.0);
+            let ends = ends.into_iter().map(|end| (end, 1.0 / 6.0));
             CornerLimit::Position(merge(std::iter::once((v, 4.0 / 6.0)).chain(ends).collect()))
         }
         (0, n) if n >= 3 => {
@@ -300,12 +309,23 @@ fn is_corner_forever(tags: &VertexTags) -> bool {
     tags.sharpness == f32::INFINITY || tags.n_infinite > 2
 }
 
+/// Whether the fan's borders are the two sharp edges of its vertex; at a fin, one edge may be both borders.
+fn is_bounded_by_crease(mesh: &LocalMesh, h: u32, fan: &Fan) -> bool {
+    mesh.crease_ends(h).is_none_or(|ends| {
+        let edges = mesh.fan_edges(fan);
+        ends.iter().all(|end| edges.iter().any(|e| e.1 == *end && mesh.edge_sharpness(e.0) == f32::INFINITY))
+    })
+}
+
 fn is_regular_corner(mesh: &LocalMesh, h: u32) -> bool {
     let tags = mesh.tags_at(h);
     let fan = mesh.fan(h);
     match (fan.spokes.len(), fan.closed) {
         (1, false) => is_corner_forever(tags),
-        (2, false) => tags.sharpness == 0.0 && tags.n_infinite == 2 && tags.semi_sharp.is_empty(),
+        (2, false) => {
+            let smooth_else = tags.sharpness == 0.0 && tags.n_infinite == 2 && tags.semi_sharp.is_empty();
+            smooth_else && is_bounded_by_crease(mesh, h, &fan)
+        }
         (4, true) => tags.sharpness == 0.0 && tags.n_infinite == 0 && tags.semi_sharp.is_empty(),
         _ => false,
     }
@@ -367,12 +387,16 @@ pub enum Origin {
     Edge(u32),
     /// A face.
     Face(u32),
+    /// The middle of a fin's sharp edge, by its ends.
+    Middle([u32; 2]),
+    /// A vertex without half-edges, which no refined point needs.
+    Nothing,
 }
 
 /// The topology and sharpness of a ring after one step.
 pub fn refine(rules: &RuleSet, mesh: &LocalMesh) -> Refined {
     let n = mesh.n_half_edges() as u32;
-    let mut origin: Vec<Origin> = vec![Origin::Vertex(NONE); mesh.n_vertices()];
+    let mut origin: Vec<Origin> = vec![Origin::Nothing; mesh.n_vertices()];
     for h in (0..n).rev() {
         origin[mesh.vertex(h) as usize] = Origin::Vertex(h);
     }
@@ -388,7 +412,12 @@ pub fn refine(rules: &RuleSet, mesh: &LocalMesh) -> Refined {
     }
     let first_face = origin.len() as u32;
     origin.extend((0..mesh.n_faces() as u32).map(Origin::Face));
-    let mut out = LocalMesh { face_start: (0..=n).map(|f| 4 * f).collect(), ..Default::default() };
+    let fins = mesh
+        .fins
+        .iter()
+        .map(|&(v, ends)| (v, ends.map(|end| fin_edge_vertex(mesh, v, end, &edge_vertex, &mut origin))));
+    let fins = fins.collect();
+    let mut out = LocalMesh { fins, face_start: (0..=n).map(|f| 4 * f).collect(), ..Default::default() };
     for h in 0..n {
         let (next, prev) = (mesh.next(h), mesh.prev(h));
         let child_of = |t: u32, k: u32| if t == NONE { NONE } else { 4 * t + k };
@@ -406,10 +435,25 @@ pub fn refine(rules: &RuleSet, mesh: &LocalMesh) -> Refined {
     Refined { mesh: out, origin }
 }
 
+/// The refined vertex in the middle of a fin's sharp edge: that of a half-edge if there is one, else one of its own.
+fn fin_edge_vertex(mesh: &LocalMesh, v: u32, end: u32, edge_vertex: &[u32], origin: &mut Vec<Origin>) -> u32 {
+    let joins = |h: u32| {
+        let ends = [mesh.vertex(h), mesh.vertex(mesh.next(h))];
+        mesh.edge_sharpness(h) == f32::INFINITY && (ends == [v, end] || ends == [end, v])
+    };
+    (0..mesh.n_half_edges() as u32).find(|&h| joins(h)).map_or_else(
+        || {
+            origin.push(Origin::Middle([v, end]));
+            origin.len() as u32 - 1
+        },
+        |h| edge_vertex[h as usize],
+    )
+}
+
 fn refined_tags(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> VertexTags {
     match origin {
         Origin::Vertex(h) => decay_tags(rules.crease_method, mesh.tags_at(h)),
-        Origin::Face(_) => VertexTags::default(),
+        Origin::Face(_) | Origin::Middle(_) | Origin::Nothing => VertexTags::default(),
         Origin::Edge(h) if mesh.edge_sharpness(h) == f32::INFINITY => {
             VertexTags { n_infinite: 2, ..Default::default() }
         }
@@ -427,5 +471,7 @@ pub fn refined_row(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> Row {
         Origin::Vertex(h) => vertex_point(rules, mesh, h),
         Origin::Edge(h) => edge_point(rules, mesh, h),
         Origin::Face(f) => merge(face_point(mesh, f)),
+        Origin::Middle([a, b]) => merge(vec![(a, 0.5), (b, 0.5)]),
+        Origin::Nothing => Row::new(),
     }
 }

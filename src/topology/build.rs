@@ -24,6 +24,8 @@ pub struct Topology {
     vertex_sharpness: FxHashMap<u32, f32>,
     /// Vertices whose faces do not form one fan or ring: their tags cannot be found by walking around them.
     nonmanifold_tags: FxHashMap<u32, VertexTags>,
+    /// Ends of the two non-manifold edges of inner vertices of fins, which are crease vertices.
+    fin_ends: FxHashMap<u32, [u32; 2]>,
     /// For half-edges of non-manifold edges: the smallest half-edge between the same vertices.
     nonmanifold_edge_owner: FxHashMap<u32, u32>,
     /// For non-manifold vertices: the smallest half-edge that starts there.
@@ -76,6 +78,7 @@ impl Topology {
             edge_sharpness: FxHashMap::default(),
             vertex_sharpness: FxHashMap::default(),
             nonmanifold_tags: FxHashMap::default(),
+            fin_ends: FxHashMap::default(),
             nonmanifold_edge_owner: FxHashMap::default(),
             nonmanifold_vertex_owner: FxHashMap::default(),
             hidden: None,
@@ -87,7 +90,7 @@ impl Topology {
         let infinite = topology.tag_edges(mesh, &by_vertex);
         drop(by_vertex);
         topology.tag_vertices(mesh, &nonmanifold);
-        topology.hide_faces(mesh, &infinite);
+        topology.hide_faces(mesh, &infinite, &nonmanifold);
         topology
     }
 
@@ -122,13 +125,14 @@ impl Topology {
     fn add_nonmanifold(&mut self, group: &[(u32, u32)], nonmanifold: &mut Vec<NonmanifoldEdge>) {
         let owner = group[0].1;
         let ends = [self.vertex[owner as usize].0, self.vertex[HalfEdges::next(self, owner) as usize].0];
-        let mut shared = NonmanifoldEdge { ends, n_faces: 0 };
+        let is_loop = ends[0] == ends[1];
+        let mut shared = NonmanifoldEdge { ends, n_faces: 0, takes_tags: true };
         let mut last_face = NONE;
-        for &(_, h) in group {
+        for (i, &(_, h)) in group.iter().enumerate() {
             self.nonmanifold_edge_owner.insert(h, owner);
             let face = self.faces.face(h);
-            if ends[0] == ends[1] || face == last_face {
-                nonmanifold.push(NonmanifoldEdge { ends, n_faces: 1 });
+            if is_loop || face == last_face {
+                nonmanifold.push(NonmanifoldEdge { ends, n_faces: 1, takes_tags: is_loop && i == 0 });
             } else {
                 shared.n_faces += 1;
             }
@@ -249,7 +253,9 @@ impl Topology {
         }
         tags.semi_sharp.sort_by(f32::total_cmp);
         let is_fin = nonmanifold.len() == 2 && n_boundary == 0 && outgoing.len() > n_edges;
-        if !is_fin {
+        if is_fin {
+            self.fin_ends.insert(v, [0, 1].map(|k| nonmanifold[k].other_end(v)));
+        } else {
             self.set_vertex_sharpness(v, f32::INFINITY);
         }
         set_bit(&mut self.tagged, v);
@@ -260,7 +266,7 @@ impl Topology {
         }
     }
 
-    fn hide_faces(&mut self, mesh: &ControlMesh, infinite: &FxHashSet<[u32; 2]>) {
+    fn hide_faces(&mut self, mesh: &ControlMesh, infinite: &FxHashSet<[u32; 2]>, nonmanifold: &[NonmanifoldEdge]) {
         if mesh.holes.is_empty() && mesh.boundary != BoundaryRule::None {
             return;
         }
@@ -269,7 +275,7 @@ impl Topology {
             set_bit(&mut hidden, face.0);
         }
         if mesh.boundary == BoundaryRule::None {
-            let open = self.vertices_of_untagged_boundaries(infinite);
+            let open = self.vertices_of_untagged_boundaries(infinite, nonmanifold);
             for (h, v) in self.vertex.iter().enumerate() {
                 if get_bit(&open, v.0) {
                     set_bit(&mut hidden, self.faces.face(h as u32));
@@ -279,11 +285,19 @@ impl Topology {
         self.hidden = hidden.iter().any(|&w| w != 0).then_some(hidden);
     }
 
-    fn vertices_of_untagged_boundaries(&self, infinite: &FxHashSet<[u32; 2]>) -> Vec<u64> {
+    /// A bit per vertex at an edge of one face that no tag made infinitely sharp.
+    fn vertices_of_untagged_boundaries(
+        &self,
+        infinite: &FxHashSet<[u32; 2]>,
+        nonmanifold: &[NonmanifoldEdge],
+    ) -> Vec<u64> {
+        let boundary = (0..self.twin.len() as u32)
+            .filter(|&h| self.is_boundary(h))
+            .map(|h| ([self.vertex[h as usize].0, self.vertex[HalfEdges::next(self, h) as usize].0], true));
+        let passed_twice = nonmanifold.iter().filter(|e| e.n_faces == 1).map(|e| (e.ends, e.takes_tags));
         let mut open = vec![0u64; self.n_vertices / 64 + 1];
-        for h in 0..self.twin.len() as u32 {
-            let [a, b] = [self.vertex[h as usize].0, self.vertex[HalfEdges::next(self, h) as usize].0];
-            if self.is_boundary(h) && !infinite.contains(&[a.min(b), a.max(b)]) {
+        for ([a, b], takes_tags) in boundary.chain(passed_twice) {
+            if !takes_tags || !infinite.contains(&[a.min(b), a.max(b)]) {
                 set_bit(&mut open, a);
                 set_bit(&mut open, b);
             }
@@ -447,12 +461,24 @@ impl HalfEdges for Topology {
             None => self.walk_tags(h),
         }
     }
+
+    fn crease_ends(&self, h: u32) -> Option<[u32; 2]> {
+        self.fin_ends.get(&self.vertex[h as usize].0).copied()
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
 struct NonmanifoldEdge {
     ends: [u32; 2],
     n_faces: u32,
+    /// Whether a tag on the two vertices means this edge: the first one between them.
+    takes_tags: bool,
+}
+
+impl NonmanifoldEdge {
+    fn other_end(&self, v: u32) -> u32 {
+        if self.ends[0] == v { self.ends[1] } else { self.ends[0] }
+    }
 }
 
 /// For each vertex, the half-edges whose smaller end it is.

@@ -36,6 +36,10 @@ pub trait HalfEdges {
     /// Tags of the vertex where `h` starts.
     fn vertex_tags(&self, h: u32) -> VertexTags;
 
+    /// The ends of the two infinitely sharp edges at the vertex where `h` starts, where faces around the vertex may not
+    /// reach both: at inner vertices of fins.
+    fn crease_ends(&self, h: u32) -> Option<[u32; 2]>;
+
     /// The next half-edge of the face.
     #[inline]
     fn next(&self, h: u32) -> u32 {

@@ -1,13 +1,13 @@
 //! Boxes to wide tree: obvhs clusters them into a binary tree, `collapse.rs` makes it wide.
 //!
 //! obvhs merges pairs of boxes that are each other's nearest. Among equal boxes, or along a row of equally spaced ones, one
-//! pair a round is all there is, and the time becomes quadratic. So it is given boxes that are a little larger than they are, each
-//! by its own amount, which leaves no ties; the tree then gets the true boxes back.
+//! pair a round is all there is, and the time becomes quadratic. So it is given boxes that are moved a little, each by
+//! its own amount, which leaves no ties; the tree then gets the true boxes back.
 
 use super::collapse::{Collapse, parents_first};
 use super::{EMPTY, LANES, LEAF, TopLevel, WideNode};
 use crate::math::Bounds;
-use glam::Vec3A;
+use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -17,10 +17,10 @@ use std::time::Duration;
 /// Memory that [`TopLevel::build`] takes while it runs, at most, for each patch; what stays is [`TopLevel::bytes`].
 pub const BUILD_BYTES_PER_PATCH: usize = 512;
 
-/// How much a box is enlarged at most, as a share of its size: enough to break ties, too little to change clusters.
+/// How far a box is moved at most to either side, as twice the share of its size: enough to break ties, too little to change clusters.
 const JITTER: f32 = 0.02;
 
-/// The same in lattice steps, for boxes that are points.
+/// The same in lattice steps, for boxes without extent.
 const JITTER_STEPS: f32 = 1.0;
 
 impl WideNode {
@@ -65,14 +65,15 @@ fn aabb(b: &Bounds) -> Aabb {
     Aabb::new(Vec3A::from(b.min), Vec3A::from(b.max))
 }
 
-/// The box, enlarged by an amount that depends on its number.
+/// The box, moved by an amount that depends on its number.
 fn jittered(i: u32, b: &Bounds) -> Aabb {
     let random = |salt: u32| {
         let mixed = (i ^ salt).wrapping_mul(0x9e37_79b9).rotate_left(15).wrapping_mul(0x85eb_ca6b);
-        (mixed >> 8) as f32 / (1 << 24) as f32
+        (mixed >> 8) as f32 / (1 << 24) as f32 - 0.5
     };
     let by = (b.max - b.min) * JITTER + JITTER_STEPS;
-    Aabb::new(Vec3A::from(b.min - by * random(1)), Vec3A::from(b.max + by * random(0x5bd1_e995)))
+    let by = by * Vec3::new(random(1), random(0x5bd1_e995), random(0x27d4_eb2f));
+    Aabb::new(Vec3A::from(b.min + by), Vec3A::from(b.max + by))
 }
 
 /// Gives every node the box of what is below it.

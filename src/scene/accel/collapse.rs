@@ -5,7 +5,7 @@ use super::LANES;
 use obvhs::bvh2::Bvh2;
 
 /// Cost of visiting a wide node, as multiples of that of visiting a leaf, per area.
-const NODE_COST: f32 = 1.0;
+const NODE_COST: f32 = 2.0;
 
 /// For every binary node, how its subtree is best shared out among a number of lanes.
 pub(super) struct Collapse {
