@@ -51,7 +51,9 @@ fn compare(mesh: &ControlMesh) -> Option<String> {
     let surface = Surface::new(mesh, 1).expect("the mesh is valid and small");
     let reference = RefinedMesh::from_control(mesh);
     let (mut points, mut evaluator) = (PatchPoints::default(), Evaluator::default());
-    let tolerance = 1e-6 * mesh.bounds().diagonal();
+    // Where all vertices are one point, f64 itself is the limit.
+    let largest = mesh.bounds().max.abs().max(mesh.bounds().min.abs()).max_element();
+    let tolerance = 1e-6 * mesh.bounds().diagonal() + 1e-15 * largest;
     for (face, &size) in mesh.face_sizes.iter().enumerate() {
         let face = FaceId::from(face);
         for sub in 0..if size == 4 { 1 } else { size } {
