@@ -28,13 +28,14 @@ const BAY_RADIUS: f64 = 10.5;
 pub(super) fn meshes() -> Vec<NamedShape> {
     let blocks: Vec<_> = (0..N_BLOCKS * N_BLOCKS).map(Block::new).filter(Block::on_land).collect();
     let buildings: Vec<_> = blocks.iter().flat_map(Block::buildings).collect();
-    let of_kind = |glass: bool| {
-        let parts = buildings.iter().filter(|b| b.glass == glass).map(|b| (b.mesh(), b.world_from_object()));
+    let made_of = |facade: Facade| {
+        let parts = buildings.iter().filter(|b| b.facade == facade).map(|b| (b.mesh(), b.world_from_object()));
         assembled(parts)
     };
     vec![
-        ("city-stone", of_kind(false)),
-        ("city-glass", of_kind(true)),
+        ("city-stone", made_of(Facade::Stone)),
+        ("city-brick", made_of(Facade::Brick)),
+        ("city-glass", made_of(Facade::Glass)),
         ("city-blocks", assembled(blocks.iter().map(|b| (slab(), b.world_from_slab())))),
         ("city-trees", assembled(blocks.iter().flat_map(Block::trees))),
         ("city-shore", shore()),
@@ -173,12 +174,20 @@ enum Style {
     Dome,
 }
 
+/// What a building looks like from the street; each is a mesh, so that it can have a material.
+#[derive(Clone, Copy, PartialEq)]
+enum Facade {
+    Stone,
+    Brick,
+    Glass,
+}
+
 struct Building {
     center: DVec2,
     half: DVec2,
     height: f64,
     style: Style,
-    glass: bool,
+    facade: Facade,
 }
 
 impl Building {
@@ -194,13 +203,19 @@ impl Building {
             5..8 => Style::Ledges,
             _ => Style::Twisted,
         };
-        let glass = match style {
-            Style::Twisted => true,
-            Style::Dome | Style::Setback => random.chance(0.15),
-            Style::Ledges => random.chance(0.4),
-            Style::House => false,
+        let (glass, brick) = match style {
+            Style::House => (0.0, 0.75),
+            Style::Twisted => (1.0, 0.0),
+            Style::Ledges => (0.4, 0.3),
+            Style::Dome => (0.1, 0.0),
+            Style::Setback => (0.15, 0.35),
         };
-        Self { center, half: DVec2::new(slim(random), slim(random)), height, style, glass }
+        let facade = match random.unit() {
+            x if x < glass => Facade::Glass,
+            x if x < glass + brick => Facade::Brick,
+            _ => Facade::Stone,
+        };
+        Self { center, half: DVec2::new(slim(random), slim(random)), height, style, facade }
     }
 
     fn world_from_object(&self) -> DAffine3 {
