@@ -52,7 +52,7 @@ impl Ground {
         let hills = fractal_noise(self.seed, at(40.0, 0.5), octaves.min(14), 0.5);
         let ridges = 1.0 - fractal_noise(self.seed ^ 0xa1, at(25.0, 0.25), octaves.min(14), 0.48).abs();
         let mountains = (2.0 * fractal_noise(self.seed ^ 0xb2, at(60.0, 0.75), 2, 0.5) + 0.35).clamp(0.0, 1.0);
-        3.0 * hills + 14.0 * mountains * ridges * ridges
+        2.0 * hills + 10.0 * mountains * ridges * ridges
     }
 }
 
