@@ -14,10 +14,11 @@
 //! ```
 //!
 //! Modules in reading order: [`mesh`], [`topology`], [`subdiv`], [`grid`], [`cache`], [`scene`], [`render`],
-//! [`image`], [`report`], [`io`], [`cli`].
+//! [`image`], [`check`], [`report`], [`io`], [`cli`].
 
 pub mod bench;
 pub mod cache;
+pub mod check;
 pub mod cli;
 pub mod error;
 pub mod grid;

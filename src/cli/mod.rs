@@ -51,6 +51,7 @@ enum Command {
     Tessellate(tessellate::TessellateArgs),
     Bench(bench::BenchArgs),
     Info(info::InfoArgs),
+    Check(check::CheckArgs),
     Compare(compare::CompareArgs),
     Generate(generate::GenerateArgs),
 }
@@ -64,6 +65,7 @@ impl Cli {
             Command::Tessellate(args) => args.run(),
             Command::Bench(args) => args.run(),
             Command::Info(args) => args.run(),
+            Command::Check(args) => args.run(),
             Command::Compare(args) => args.run(),
             Command::Generate(args) => args.run(),
         }

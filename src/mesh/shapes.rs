@@ -15,7 +15,7 @@ mod crowd;
 mod ground;
 mod hello;
 mod model;
-pub(super) mod noise;
+pub(crate) mod noise;
 mod odd;
 mod scan;
 mod sweep;

@@ -4,6 +4,7 @@
 
 use super::camera::Camera;
 use super::description::Rate;
+use crate::mesh::shapes::noise::hash;
 use glam::DVec3;
 
 /// The largest rate: more cells than this along an edge are never made.
@@ -21,6 +22,9 @@ pub enum DicingRate {
         /// Pieces of length 1 at distance 1 from the eye are this many target lengths long.
         pieces_per_unit: f64,
     },
+    /// Every edge has its own rate, drawn with this seed from 1..=1000, with as many in 1..2 as in 2..4, 4..8 and so on:
+    /// the hardest neighbours for tests.
+    Random(u64),
 }
 
 impl DicingRate {
@@ -43,15 +47,29 @@ impl DicingRate {
     pub fn edge_rate(&self, a: DVec3, b: DVec3) -> u32 {
         match *self {
             Self::Fixed(n) => n,
+            Self::Random(seed) => {
+                let (a, b) = in_order(a, b);
+                random_rate(a.to_array().into_iter().chain(b.to_array()).fold(seed, |h, x| hash(h, x.to_bits(), 0)))
+            }
             Self::Pixels { eye, pieces_per_unit } => {
-                // One order for both neighbours, so that rounding agrees too.
-                let (a, b) = if a.to_array() <= b.to_array() { (a, b) } else { (b, a) };
+                let (a, b) = in_order(a, b);
                 let pieces = (b - a).length() * pieces_per_unit / distance_to_segment(eye, a, b);
                 // The cast takes NaN (a point at the eye) to 0 and infinity to the largest integer.
                 (pieces.ceil() as u32).clamp(1, MAX_RATE)
             }
         }
     }
+}
+
+/// One order for both neighbours, so that rounding agrees too.
+fn in_order(a: DVec3, b: DVec3) -> (DVec3, DVec3) {
+    if a.to_array() <= b.to_array() { (a, b) } else { (b, a) }
+}
+
+/// A rate from 64 random bits: the number of its binary digits is uniform, and then the digits are.
+fn random_rate(bits: u64) -> u32 {
+    let leading = 1 << (bits % 10);
+    (leading | (bits >> 32) as u32 & (leading - 1)).min(1000)
 }
 
 fn distance_to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
@@ -91,6 +109,16 @@ mod tests {
             let (a, b) = (DVec3::new(next(), next(), next()), DVec3::new(next(), next(), next()));
             assert_eq!(pixels(0.1).edge_rate(a, b), pixels(0.1).edge_rate(b, a));
         }
+    }
+
+    #[test]
+    fn random_rates_belong_to_the_edge_and_mix_ones_with_hundreds() {
+        let rate = |k: u32, seed: u64| DicingRate::Random(seed).edge_rate(DVec3::X, f64::from(k) * DVec3::Y);
+        let rates: Vec<u32> = (0..500).map(|k| rate(k, 7)).collect();
+        assert!((0..500).all(|k| rate(k, 7) == DicingRate::Random(7).edge_rate(f64::from(k) * DVec3::Y, DVec3::X)));
+        assert!(rates.iter().all(|r| (1..=1000).contains(r)));
+        assert!(rates.iter().filter(|&&r| r == 1).count() > 25 && rates.iter().filter(|&&r| r > 500).count() > 25);
+        assert_ne!(rates, (0..500).map(|k| rate(k, 8)).collect::<Vec<_>>());
     }
 
     #[test]

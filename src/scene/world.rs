@@ -189,7 +189,7 @@ impl WorldMesh {
         &self.world_from_object
     }
 
-    pub(super) fn lattice_from_world(&self) -> &DAffine3 {
+    pub(crate) fn lattice_from_world(&self) -> &DAffine3 {
         &self.lattice_from_world
     }
 

@@ -149,7 +149,7 @@ impl SidePoint {
 }
 
 /// The edge point that border vertex `i` of `n` snaps to where the side has only `rate` segments.
-fn snapped(i: u32, n: u32, rate: u32) -> u32 {
+pub fn snapped(i: u32, n: u32, rate: u32) -> u32 {
     ((2 * u64::from(i) * u64::from(rate) + u64::from(n)) / (2 * u64::from(n))) as u32
 }
 

@@ -5,7 +5,7 @@
 use glam::{DVec3, IVec3};
 
 /// Mixes a seed and two numbers into 64 well-stirred bits (the finaliser of SplitMix64, three times).
-pub(super) fn hash(seed: u64, a: u64, b: u64) -> u64 {
+pub(crate) fn hash(seed: u64, a: u64, b: u64) -> u64 {
     mix(mix(mix(seed) ^ a) ^ b)
 }
 
@@ -18,7 +18,7 @@ fn mix(x: u64) -> u64 {
 
 /// A sequence of random numbers.
 #[derive(Clone, Debug)]
-pub(in crate::mesh) struct Random {
+pub(crate) struct Random {
     seed: u64,
     drawn: u64,
 }
