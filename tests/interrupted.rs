@@ -25,16 +25,16 @@ fn long_render(folder: &Path) -> Child {
     command.args(line.split(' ')).current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits until the process has used so much processor time that it must be rendering.
-fn wait_until_busy(process: &Child) {
+/// Waits until the process has used that much processor time.
+fn wait_until_busy(process: &Child, seconds: f64) {
     let (start, stat) = (Instant::now(), format!("/proc/{}/stat", process.id()));
     while start.elapsed() < Duration::from_secs(60) {
-        std::thread::sleep(Duration::from_millis(100));
+        std::thread::sleep(Duration::from_millis(10));
         match fs::read_to_string(&stat) {
             // Fields 14 and 15, counted from after the name: ticks of 10 ms.
             Ok(text) => {
                 let ticks = |n: usize| text.rsplit(')').next()?.split_whitespace().nth(n - 3)?.parse::<u64>().ok();
-                if ticks(14).zip(ticks(15)).is_some_and(|(user, system)| user + system > 100) {
+                if ticks(14).zip(ticks(15)).is_some_and(|(user, system)| (user + system) as f64 > 100.0 * seconds) {
                     return;
                 }
             }
@@ -52,7 +52,8 @@ fn signal(process: &Child, name: &str) {
 fn interrupted(name: &str) -> (tempfile::TempDir, Output) {
     let folder = folder();
     let process = long_render(folder.path());
-    wait_until_busy(&process);
+    // A second is far more than reading and preparing the torus take.
+    wait_until_busy(&process, 1.0);
     signal(&process, name);
     (folder, process.wait_with_output().unwrap())
 }
@@ -72,6 +73,26 @@ fn ctrl_c_writes_what_is_done_and_says_so() {
         let done = stats["picture"]["pixels_done"].as_u64().unwrap();
         assert!(done > 0 && done < 12_000_000, "{done}");
     }
+}
+
+#[test]
+fn ctrl_c_before_the_first_pixel_leaves_the_old_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |line: &str| {
+        let mut command = Command::new(LAZYTESS);
+        command.args(line.split(' ')).current_dir(folder.path()).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    // Takes seconds to read and prepare.
+    assert!(run("generate ground --faces 400k -o ground.obj").wait().unwrap().success());
+    fs::write(folder.path().join("out.exr"), "the old picture").unwrap();
+    let process = run("render ground.obj -o out.exr --rate fixed:1");
+    wait_until_busy(&process, 0.05);
+    signal(&process, "-INT");
+    let output = process.wait_with_output().unwrap();
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{told}");
+    assert!(told.contains("interrupted before the first pixel: out.exr is as it was"), "{told}");
+    assert_eq!(fs::read(folder.path().join("out.exr")).unwrap(), b"the old picture");
 }
 
 /// Renders with a limit on the size of files that stops the write midway.

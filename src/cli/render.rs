@@ -138,6 +138,10 @@ impl RenderJob {
         let watch = Stopwatch::start();
         let rendered = prepared.render(&cache, self.threads, self.quiet, &cancel);
         prepared.seconds.render = watch.seconds().into();
+        if rendered.film.n_done() == 0 {
+            let message = format!("interrupted before the first pixel: {} is as it was", self.output.display());
+            return Err(Error::new(ErrorKind::Interrupted, message));
+        }
         let watch = Stopwatch::start();
         output::write_film(&self.output, self.format, &rendered.film)?;
         prepared.seconds.write = watch.seconds().into();
