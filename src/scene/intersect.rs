@@ -360,18 +360,24 @@ impl<'w> Intersector<'w> {
     }
 
     /// The ray as the mesh's lattice sees it. `t` keeps its meaning.
-    fn lattice_ray(&self, mesh: MeshId, ray: &Ray, t_max: f32) -> LatticeRay {
+    /// `None` if it misses the mesh's box.
+    #[inline(always)]
+    fn lattice_ray(&self, mesh: MeshId, ray: &Ray, t_max: f32) -> Option<LatticeRay> {
         let to = self.world.mesh(mesh).lattice_from_world();
+        let (origin, direction) = (to.transform_point3(ray.origin), to.transform_vector3(ray.direction));
+        if !self.world.mesh(mesh).is_in_reach(origin, direction) {
+            return None;
+        }
         let skip = match ray.from {
             Some(from) if from.mesh == mesh => triangle_id(self.world, &from),
             _ => TriangleId::NONE,
         };
-        LatticeRay::new(to.transform_point3(ray.origin), to.transform_vector3(ray.direction), t_max, skip)
+        Some(LatticeRay::new(origin, direction, t_max, skip))
     }
 
     fn closest_in_mesh(&mut self, mesh: MeshId, ray: &Ray, best: &mut Option<Hit>) {
         let t_max = best.map_or(ray.t_max, |hit| hit.t);
-        let lattice_ray = self.lattice_ray(mesh, ray, t_max);
+        let Some(lattice_ray) = self.lattice_ray(mesh, ray, t_max) else { return };
         let mut found = LatticeHit::none(lattice_ray.t_max());
         simd::run(ClosestInMesh { tracer: self, mesh, ray: &lattice_ray, hit: &mut found });
         if found.is_some() {
@@ -451,7 +457,7 @@ impl Intersect for Intersector<'_> {
     fn occluded(&mut self, ray: &Ray) -> bool {
         let occluded_by = |tracer: &mut Self, mesh: MeshId| {
             let lattice_ray = tracer.lattice_ray(mesh, ray, ray.t_max);
-            simd::run(OccludedInMesh { tracer, mesh, ray: &lattice_ray })
+            lattice_ray.is_some_and(|ray| simd::run(OccludedInMesh { tracer, mesh, ray: &ray }))
         };
         if self.world.meshes().len() == 1 {
             return occluded_by(self, MeshId(0));

@@ -17,6 +17,10 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 /// Quarters of an irregular patch that its box looks into: more make the box tighter, and building slower.
 const BOX_DEPTH: u32 = 3;
 
+/// Lattice steps around a mesh's box within which a ray is worth a look: rays are rounded to f32 near the mesh, which
+/// moves them by less than 48 steps.
+const REACH_MARGIN: f64 = 256.0;
+
 /// Patches whose boxes one thread computes before it asks for more.
 const PATCHES_PER_TASK: usize = 4096;
 
@@ -43,6 +47,8 @@ pub struct WorldMesh {
     world_from_object_normal: DMat3,
     rate: DicingRate,
     bounds_in_world: DBounds,
+    /// The top level's box in lattice units, widened by more than a ray's rounding.
+    reach: DBounds,
 }
 
 /// What the full tessellation would take.
@@ -144,6 +150,7 @@ impl WorldMesh {
         let linear = world_from_object.matrix3;
         let bounds = boxes.iter().fold(Bounds::EMPTY, |a, b| a.union(*b));
         let bounds_in_world = world_box(&surface, world_from_object, bounds);
+        let reach = DBounds { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() }.expanded(REACH_MARGIN);
         let top = TopLevel::build(&boxes);
         let visible = (patches.len() != surface.n_patches()).then_some(patches);
         Ok(Self {
@@ -155,6 +162,7 @@ impl WorldMesh {
             world_from_object_normal: linear.inverse().transpose() * linear.determinant().signum(),
             rate,
             bounds_in_world,
+            reach,
             surface,
         })
     }
@@ -216,8 +224,25 @@ impl WorldMesh {
 
     /// How finely a patch is diced.
     pub fn patch_rates(&self, patch: PatchId) -> PatchRates {
+        if let DicingRate::Fixed(n) = self.rate {
+            return self.surface.uniform_rates(patch, n);
+        }
         let world = |p: DVec3| self.world_from_object.transform_point3(p);
         self.surface.patch_rates(patch, &|a, b| self.rate.edge_rate(world(a), world(b)))
+    }
+
+    /// Whether a ray in lattice space may come near the mesh at all: a quick look before the ray is made ready for the tree.
+    #[inline(always)]
+    pub(super) fn is_in_reach(&self, origin: DVec3, direction: DVec3) -> bool {
+        let inverse = direction.recip();
+        let (a, b) = ((self.reach.min - origin) * inverse, (self.reach.max - origin) * inverse);
+        // f64's min and max pass over the NaN of a ray within a plane of the box.
+        let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+        for k in 0..3 {
+            enter = enter.max(a[k].min(b[k]));
+            leave = leave.min(a[k].max(b[k]));
+        }
+        enter <= leave * (1.0 + 1e-9)
     }
 
     /// Bytes held, for the whole render.

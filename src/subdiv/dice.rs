@@ -72,6 +72,14 @@ impl Surface {
         ])
     }
 
+    /// [`patch_rates`](Self::patch_rates) for the same rate everywhere.
+    pub fn uniform_rates(&self, patch: PatchId, n: u32) -> PatchRates {
+        if self.topology().all_quads() {
+            return PatchRates::new([n.clamp(1, MAX_RATE); 4]);
+        }
+        self.patch_rates(patch, &|_, _| n)
+    }
+
     fn edge_rate(&self, h: u32, rate: &impl Fn(DVec3, DVec3) -> u32) -> u32 {
         let [a, b] = [h, self.topology().next(h)].map(|h| self.object_point(self.topology().vertex(h)));
         let r = rate(a, b).clamp(1, MAX_RATE);

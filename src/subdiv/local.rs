@@ -3,7 +3,7 @@
 //! Face 0 is the target and half-edge 0 its first corner. Only the target's corners know all their faces (up to
 //! infinitely sharp edges, which nothing crosses); that is enough to refine the target and the rings of its quarters.
 
-use crate::topology::{Fan, HalfEdges, NONE, VertexTags, fan};
+use crate::topology::{Fan, HalfEdges, NONE, Topology, VertexTags, fan};
 use rustc_hash::FxHashMap;
 
 /// The ring of a target face.
@@ -162,6 +162,96 @@ pub fn extract<M: HalfEdges + ?Sized>(mesh: &M, first: u32, outer_tags: bool) ->
     x.finish(&corner_tags, outer_tags)
 }
 
+/// Rings with more faces than this are found by [`extract`], whose time does not grow with the square of their size.
+const MAX_SCANNED_FACES: usize = 64;
+
+/// Finds the vertices of rings without making the ring: what loading a patch needs, again and again.
+#[derive(Debug, Default)]
+pub struct RingWalker {
+    /// Half-edge where each face of the ring starts.
+    starts: Vec<u32>,
+    faces: Vec<u32>,
+    vertices: Vec<u32>,
+}
+
+impl RingWalker {
+    /// The sources that [`extract`] gives for the face of `first`.
+    pub fn sources(&mut self, topology: &Topology, first: u32, outer_tags: bool) -> &[u32] {
+        self.starts.clear();
+        self.faces.clear();
+        self.vertices.clear();
+        self.add_face(topology, first);
+        let n_corners = topology.face_corners(topology.face(first)).1;
+        let mut h = first;
+        for _ in 0..n_corners {
+            self.add_fan(topology, h);
+            h = topology.next(h);
+            if self.faces.len() > MAX_SCANNED_FACES {
+                self.vertices = extract(topology, first, outer_tags).sources;
+                return &self.vertices;
+            }
+        }
+        self.add_vertices(topology);
+        for _ in 0..n_corners {
+            if let Some(ends) = topology.crease_ends(h) {
+                ends.into_iter().for_each(|v| self.add_vertex(v));
+            }
+            h = topology.next(h);
+        }
+        &self.vertices
+    }
+
+    fn add_face(&mut self, topology: &Topology, h: u32) {
+        let face = topology.face(h);
+        if !self.faces.contains(&face) {
+            self.faces.push(face);
+            self.starts.push(h);
+        }
+    }
+
+    /// The faces around a corner in [`extract`]'s order: counter-clockwise, then what lies clockwise.
+    fn add_fan(&mut self, topology: &Topology, h: u32) {
+        let cut = topology.is_tagged(topology.vertex(h)) && topology.vertex_tags(h).n_infinite >= 2;
+        let mut spoke = h;
+        loop {
+            let arriving = topology.prev(spoke);
+            if is_border(topology, arriving, cut) {
+                break;
+            }
+            spoke = topology.twin(arriving);
+            if spoke == h {
+                return;
+            }
+            self.add_face(topology, spoke);
+        }
+        spoke = h;
+        while !is_border(topology, spoke, cut) {
+            spoke = topology.next(topology.twin(spoke));
+            self.add_face(topology, spoke);
+        }
+    }
+
+    fn add_vertices(&mut self, topology: &Topology) {
+        for i in 0..self.starts.len() {
+            let start = self.starts[i];
+            let mut h = start;
+            loop {
+                self.add_vertex(topology.vertex(h));
+                h = topology.next(h);
+                if h == start {
+                    break;
+                }
+            }
+        }
+    }
+
+    fn add_vertex(&mut self, v: u32) {
+        if !self.vertices.contains(&v) {
+            self.vertices.push(v);
+        }
+    }
+}
+
 struct Extractor<'a, M: ?Sized> {
     source: &'a M,
     /// Half-edge of the source where each local face starts.
@@ -248,5 +338,28 @@ impl<M: HalfEdges + ?Sized> Extractor<'_, M> {
                 if known && mesh.twin[i] != NONE { self.source.edge_sharpness(half_edges[i]) } else { 0.0 }
             })
             .collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::random::random_mesh;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn walked_rings_are_the_extracted_ones() {
+        let shapes = shapes::all().into_iter().map(|(_, mesh)| mesh);
+        let mut walker = RingWalker::default();
+        for mesh in shapes.chain((0..100).map(random_mesh)) {
+            let topology = Topology::new(&mesh);
+            for face in 0..topology.n_faces() as u32 {
+                let first = topology.face_corners(face).0;
+                for outer_tags in [false, true] {
+                    let extracted = extract(&topology, first, outer_tags).sources;
+                    assert_eq!(walker.sources(&topology, first, outer_tags), extracted);
+                }
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! One mesh ready for evaluation: topology, control points in lattice units, and the plan of every face.
 
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, grow_by_hull, sample_regular};
-use super::local::extract;
+use super::local::{RingWalker, extract};
 use super::plan::{NodeId, PlanLibrary};
 use super::regular::ControlPoints;
 use super::rules::RuleSet;
@@ -77,11 +77,19 @@ pub struct PatchPoints {
     control: ControlPoints,
     ring: Vec<Point>,
     parent: Vec<Point>,
+    walker: RingWalker,
 }
 
 impl Default for PatchPoints {
     fn default() -> Self {
-        Self { patch: None, node: REGULAR, control: [Point::ZERO; 16], ring: Vec::new(), parent: Vec::new() }
+        Self {
+            patch: None,
+            node: REGULAR,
+            control: [Point::ZERO; 16],
+            ring: Vec::new(),
+            parent: Vec::new(),
+            walker: RingWalker::default(),
+        }
     }
 }
 
@@ -199,7 +207,7 @@ impl Surface {
             points.control = vertices.map(|v| self.control_point(v));
             return;
         }
-        let sources = extract(&self.topology, first, self.library.outer_tags()).sources;
+        let sources = points.walker.sources(&self.topology, first, self.library.outer_tags());
         points.ring.clear();
         if size == 4 {
             points.ring.extend(sources.iter().map(|&v| self.control_point(v)));
