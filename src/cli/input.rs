@@ -1,7 +1,7 @@
 //! A scene or a mesh, as the first argument of most commands.
 
 use crate::error::{Error, Result};
-use crate::io::obj::read_obj;
+use crate::io::obj::read_obj_within;
 use crate::io::scene_file::read_scene;
 use crate::mesh::ControlMesh;
 use crate::scene::description::{Rate, SceneDescription};
@@ -19,7 +19,12 @@ pub fn load_scene(path: &Path) -> Result<SceneDescription> {
 
 /// Reads a mesh and tells its warnings on stderr.
 pub fn load_mesh(path: &Path) -> Result<ControlMesh> {
-    let obj = read_obj(path)?;
+    load_mesh_within(path, u64::MAX)
+}
+
+/// As [`load_mesh`], while the process has at most `limit` bytes resident.
+pub fn load_mesh_within(path: &Path, limit: u64) -> Result<ControlMesh> {
+    let obj = read_obj_within(path, limit)?;
     obj.warnings.iter().for_each(|warning| eprintln!("lazytess: warning: {warning}"));
     Ok(obj.mesh)
 }

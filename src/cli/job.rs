@@ -1,13 +1,14 @@
 //! From a described scene to a picture: what all commands that render have in common.
 
 use super::camera::CameraArgs;
-use super::input::load_mesh;
+use super::input::load_mesh_within;
 use super::progress::Progress;
 use super::values::CacheSize;
 use crate::cache::CacheConfig;
 use crate::error::Result;
-use crate::io::process::Stopwatch;
+use crate::io::process::{self, Stopwatch};
 use crate::mesh::ControlMesh;
+use crate::render::budget::{RenderNeeds, too_small};
 use crate::render::settings::{self, Appearance, RenderSettings, RunSettings};
 use crate::render::workers::{Rendered, render};
 use crate::report::PhaseSeconds;
@@ -15,7 +16,7 @@ use crate::scene::camera::Camera;
 use crate::scene::compile::{camera_of, compile};
 use crate::scene::description::SceneDescription;
 use crate::scene::intersect::Intersector;
-use crate::scene::world::{GridCache, World};
+use crate::scene::world::{GridCache, World, WorldMesh};
 use std::sync::atomic::AtomicBool;
 
 /// A scene whose meshes have not been read.
@@ -26,6 +27,8 @@ pub struct RenderScene<'a> {
     pub camera: CameraArgs,
     /// What to render.
     pub settings: &'a RenderSettings,
+    /// Bytes that the whole process may have resident.
+    pub memory: Option<u64>,
 }
 
 /// A scene ready to be traced.
@@ -50,9 +53,29 @@ impl<'a> RenderScene<'a> {
         let control_faces = meshes.iter().map(ControlMesh::n_faces).sum();
         let mut seconds = PhaseSeconds { load: watch.seconds().into(), ..Default::default() };
         let watch = Stopwatch::start();
+        if let Some(budget) = self.memory {
+            self.check_budget(budget, &meshes, threads)?;
+        }
         let (world, camera) = self.compile(meshes, threads, quiet)?;
         seconds.prepare = watch.seconds().into();
         Ok(Prepared { scene: self.scene, settings: self.settings, world, camera, control_faces, seconds })
+    }
+
+    /// Refuses a budget that preparing and tracing these meshes would certainly exceed.
+    fn check_budget(&self, budget: u64, meshes: &[ControlMesh], threads: usize) -> Result<()> {
+        process::give_back_freed_memory();
+        let mut held = process::resident_bytes().unwrap_or(0);
+        let (mut peak, mut tables) = (held, 0);
+        for mesh in meshes {
+            let build = WorldMesh::build_bytes(mesh);
+            held = held.saturating_sub(mesh.bytes() as u64);
+            peak = peak.max(held + build.peak as u64);
+            held += build.resident as u64;
+            tables += build.tables;
+        }
+        let needs = RenderNeeds::new(held, tables, self.settings, threads);
+        let smallest = peak.max(needs.smallest_budget());
+        if smallest > budget { Err(too_small(budget, smallest, "to prepare the meshes; then")) } else { Ok(()) }
     }
 
     /// Prepares meshes that have been read, and the camera that frames them.
@@ -70,7 +93,7 @@ impl<'a> RenderScene<'a> {
         let progress = Progress::new("meshes read", quiet);
         let n = self.scene.meshes.len();
         let read = self.scene.meshes.iter().enumerate().map(|(i, description)| {
-            let mesh = load_mesh(&description.file)?;
+            let mesh = load_mesh_within(&description.file, self.memory.unwrap_or(u64::MAX))?;
             progress.set(i + 1, n);
             Ok(mesh)
         });
@@ -89,6 +112,18 @@ impl Prepared<'_> {
             CacheSize::Bytes(_) => 0,
         };
         GridCache::new(&self.world, CacheConfig { capacity: size.capacity(most), ..CacheConfig::with_bytes(0) })
+    }
+
+    /// The cache that a budget for the whole process leaves room for.
+    ///
+    /// # Errors
+    /// If it leaves none; the message names the smallest budget that would do.
+    pub fn cache_within(&self, budget: u64, threads: usize) -> Result<CacheSize> {
+        process::give_back_freed_memory();
+        let resident = process::resident_bytes().unwrap_or(self.world.bytes() as u64);
+        let tables = GridCache::table_bytes_for(&self.world);
+        let needs = RenderNeeds::new(resident, tables, self.settings, threads);
+        Ok(CacheSize::Bytes(needs.cache_bytes(budget)?))
     }
 
     /// Renders, with a progress bar where one can be seen.

@@ -132,9 +132,11 @@ impl RenderArgs {
 impl RenderJob {
     fn run(self, input: &str) -> Result<()> {
         let cancel = cancel_on_interrupt()?;
-        let scene = RenderScene { scene: &self.scene, camera: self.camera, settings: &self.settings };
+        let scene =
+            RenderScene { scene: &self.scene, camera: self.camera, settings: &self.settings, memory: self.memory };
         let mut prepared = scene.prepare(self.threads, self.quiet)?;
-        let cache = prepared.cache(self.cache, self.threads)?;
+        let size = self.memory.map_or(Ok(self.cache), |budget| prepared.cache_within(budget, self.threads))?;
+        let cache = prepared.cache(size, self.threads)?;
         let watch = Stopwatch::start();
         let rendered = prepared.render(&cache, self.threads, self.quiet, &cancel);
         prepared.seconds.render = watch.seconds().into();
@@ -142,10 +144,17 @@ impl RenderJob {
             let message = format!("interrupted before the first pixel: {} is as it was", self.output.display());
             return Err(Error::new(ErrorKind::Interrupted, message));
         }
+        let is_reported = !self.quiet || self.stats.is_some();
+        let statistics = is_reported.then(|| self.statistics(input, &prepared, size, &cache, &rendered));
+        // Writing needs memory, too, and the budget counts on this.
+        drop(cache);
         let watch = Stopwatch::start();
         output::write_film(&self.output, self.format, &rendered.film)?;
-        prepared.seconds.write = watch.seconds().into();
-        self.report(input, &prepared, &cache, &rendered)?;
+        if let Some(mut statistics) = statistics {
+            statistics.seconds.write = watch.seconds().into();
+            statistics.memory.peak_resident_bytes = peak_resident_bytes();
+            self.report(&statistics)?;
+        }
         if cancel.load(Ordering::Relaxed) && !rendered.complete {
             let (done, all) = (rendered.film.n_done(), self.settings.window.n_pixels());
             let message = format!("interrupted: {done} of {all} pixels are done and in {}", self.output.display());
@@ -154,11 +163,7 @@ impl RenderJob {
         Ok(())
     }
 
-    fn report(&self, input: &str, prepared: &Prepared<'_>, cache: &GridCache, rendered: &Rendered) -> Result<()> {
-        if self.quiet && self.stats.is_none() {
-            return Ok(());
-        }
-        let statistics = self.statistics(input, prepared, cache, rendered);
+    fn report(&self, statistics: &RenderStatistics) -> Result<()> {
         if let Some(path) = &self.stats {
             let json = statistics.to_json();
             write_whole(path, |out| out.write_all(json.as_bytes()))?;
@@ -173,11 +178,12 @@ impl RenderJob {
         &self,
         input: &str,
         prepared: &Prepared<'_>,
+        size: CacheSize,
         cache: &GridCache,
         rendered: &Rendered,
     ) -> RenderStatistics {
         let full = prepared.world.full_tessellation(self.threads);
-        let capacity = match self.cache {
+        let capacity = match size {
             CacheSize::Bytes(bytes) => Some(bytes),
             CacheSize::Unbounded => None,
         };
@@ -205,7 +211,7 @@ impl RenderJob {
                 full_bytes: full.bytes,
             },
             cache: CacheReport::new(capacity, &cache.segments().statistics()),
-            memory: MemoryReport { budget_bytes: self.memory, peak_resident_bytes: peak_resident_bytes() },
+            memory: MemoryReport { budget_bytes: self.memory, peak_resident_bytes: None },
             seconds: prepared.seconds,
         }
     }

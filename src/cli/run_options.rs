@@ -2,12 +2,14 @@
 
 use super::SPEED;
 use super::values::{ByteSize, CacheSize, count};
+use crate::io::process::available_bytes;
 use clap::Args;
 
 /// What was typed about how to run.
 #[derive(Args, Clone, Debug)]
 pub struct RunArgs {
-    /// Memory for tessellated patches; any size works, 0 included [default: 256M]
+    /// Memory for tessellated patches; any size works, 0 included [default: 256M, less if the machine has less than
+    /// twice that available]
     #[arg(long, value_name = "SIZE|unbounded", help_heading = SPEED)]
     pub cache: Option<CacheSize>,
     /// Worker threads [default: one for each processor]
@@ -26,13 +28,18 @@ pub struct MemoryArgs {
     pub memory: Option<ByteSize>,
 }
 
+/// Half of what the machine has available is left to meshes and to other programs.
+fn default_cache(available: Option<u64>) -> CacheSize {
+    CacheSize::Bytes(available.map_or(RunArgs::DEFAULT_CACHE_BYTES, |n| (n / 2).min(RunArgs::DEFAULT_CACHE_BYTES)))
+}
+
 impl RunArgs {
-    /// Cache size when neither `--cache` nor `--memory` is given.
-    pub const DEFAULT_CACHE: CacheSize = CacheSize::Bytes(256 << 20);
+    /// Bytes of the cache when neither `--cache` nor `--memory` is given and the machine has enough.
+    pub const DEFAULT_CACHE_BYTES: u64 = 256 << 20;
 
     /// The cache's size.
     pub fn cache(&self) -> CacheSize {
-        self.cache.unwrap_or(Self::DEFAULT_CACHE)
+        self.cache.unwrap_or_else(|| default_cache(available_bytes()))
     }
 
     /// Number of worker threads, at least 1.
@@ -43,5 +50,17 @@ impl RunArgs {
     /// One thread for each processor that this process may use.
     pub fn available_threads() -> usize {
         std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_cache_shrinks_with_the_machine() {
+        assert_eq!(default_cache(None), CacheSize::Bytes(256 << 20));
+        assert_eq!(default_cache(Some(8 << 30)), CacheSize::Bytes(256 << 20));
+        assert_eq!(default_cache(Some(100 << 20)), CacheSize::Bytes(50 << 20));
     }
 }

@@ -15,19 +15,39 @@ pub fn resident_bytes() -> Option<u64> {
 }
 
 fn status_bytes(key: &str) -> Option<u64> {
-    bytes_in("/proc/self/status", key)
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    kilobytes(&status, key)
 }
 
-/// The memory that programs can still get without others being swapped out; `None` where the system does not tell.
-pub fn available_bytes() -> Option<u64> {
-    bytes_in("/proc/meminfo", "MemAvailable:")
-}
-
-fn bytes_in(file: &str, key: &str) -> Option<u64> {
-    let lines = std::fs::read_to_string(file).ok()?;
-    let value = lines.lines().find_map(|line| line.strip_prefix(key))?;
+/// The value of a line such as `VmRSS:   1234 kB`, in bytes.
+fn kilobytes(text: &str, key: &str) -> Option<u64> {
+    let value = text.lines().find_map(|line| line.strip_prefix(key))?;
     value.trim().strip_suffix(" kB")?.trim().parse::<u64>().ok().map(|kb| kb * 1024)
 }
+
+/// The memory that this process may still take without others being pushed out, in bytes: what the machine has
+/// available, or what its control group leaves if that is less. `None` where the system does not tell.
+pub fn available_bytes() -> Option<u64> {
+    let machine = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| kilobytes(&text, "MemAvailable:"));
+    let number = |path: &str| std::fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
+    let group = |max: &str, now: &str| Some(number(max)?.saturating_sub(number(now)?));
+    let v2 = group("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current");
+    let v1 = group("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes");
+    [machine, v2, v1].into_iter().flatten().min()
+}
+
+/// Gives freed memory back to the system where the allocator would keep it, so that [`resident_bytes`] tells what is
+/// really in use.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[allow(unsafe_code)]
+pub fn give_back_freed_memory() {
+    // SAFETY: no argument, no precondition; thread-safe.
+    unsafe { libc::malloc_trim(0) };
+}
+
+/// Nothing to be done here.
+#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+pub fn give_back_freed_memory() {}
 
 /// Processor time of all threads of this process so far.
 pub fn process_cpu() -> Duration {
@@ -72,6 +92,12 @@ mod tests {
         let ballast = vec![1u8; 32 << 20];
         let (now, peak) = (resident_bytes().unwrap(), peak_resident_bytes().unwrap());
         assert!(now > 32 << 20 && peak + (1 << 20) >= now, "{now} {peak} {}", ballast[0]);
+    }
+
+    #[test]
+    fn the_machine_tells_what_it_has_left() {
+        assert!(available_bytes().unwrap() > 1 << 20);
+        give_back_freed_memory();
     }
 
     #[test]

@@ -65,6 +65,13 @@ pub struct TexCoords {
     pub indices: Vec<u32>,
 }
 
+impl TexCoords {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.values) + size_of_val(&*self.indices)
+    }
+}
+
 /// A validated control mesh.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct ControlMesh {
@@ -147,6 +154,17 @@ impl ControlMesh {
             return Err(Error::input("a crease or corner has a sharpness that is not a number"));
         }
         self.edits.iter().try_for_each(|edit| edit.validate(&self.face_sizes))
+    }
+
+    /// Bytes held by positions, polygons and texture coordinates.
+    pub fn bytes(&self) -> usize {
+        let tex_coords = self.tex_coords.as_ref().map_or(0, TexCoords::bytes);
+        size_of_val(&*self.positions) + size_of_val(&*self.face_sizes) + size_of_val(&*self.face_vertices) + tex_coords
+    }
+
+    /// The texture coordinates alone.
+    pub fn into_tex_coords(self) -> Option<TexCoords> {
+        self.tex_coords
     }
 
     /// Number of faces.

@@ -21,6 +21,7 @@
 
 #[cfg(test)]
 mod analytic;
+pub mod budget;
 pub mod film;
 pub mod integrators;
 mod lazy;

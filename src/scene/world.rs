@@ -1,6 +1,6 @@
 //! Everything about the scene's geometry that stays the same during a render.
 
-use super::accel::TopLevel;
+use super::accel::{BUILD_BYTES_PER_PATCH, TopLevel};
 use super::description::MeshDescription;
 use super::rate::DicingRate;
 use crate::cache::{CacheConfig, SegmentCache, SlotTable};
@@ -23,6 +23,23 @@ const REACH_MARGIN: f64 = 256.0;
 
 /// Patches whose boxes one thread computes before it asks for more.
 const PATCHES_PER_TASK: usize = 4096;
+
+/// Bytes of the tree over a mesh's patches, for each: a node of 224 bytes for every four to five of them.
+const TREE_BYTES_PER_PATCH: usize = 50;
+
+/// Bytes of the tree for each slot of the cache.
+const BYTES_PER_SLOT: usize = 28;
+
+/// What preparing a mesh takes, its polygons included in the peak only. Estimated from counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BuildBytes {
+    /// What stays.
+    pub resident: usize,
+    /// Slots of a cache for it.
+    pub tables: usize,
+    /// The most at any time, the mesh that goes in included.
+    pub peak: usize,
+}
 
 /// The meshes of a scene, ready to be traced.
 #[derive(Debug)]
@@ -139,7 +156,8 @@ impl WorldMesh {
     /// Prepares a mesh for tracing on `n_threads` threads: plans, boxes and tree, but no grid.
     pub fn new(mesh: ControlMesh, world_from_object: DAffine3, rate: DicingRate, n_threads: usize) -> Result<Self> {
         let surface = Surface::new(&mesh, n_threads)?;
-        let tex_coords = mesh.tex_coords;
+        // The tree over ten million patches takes a gigabyte to build: polygons and positions are gone before.
+        let tex_coords = mesh.into_tex_coords();
         let patches: Vec<PatchId> = surface.visible_patches().collect();
         let boxes = patch_boxes(&surface, &patches, n_threads);
         let lattice = surface.lattice();
@@ -245,9 +263,28 @@ impl WorldMesh {
         enter <= leave * (1.0 + 1e-9)
     }
 
+    /// What [`new`](Self::new) will take for this mesh.
+    pub fn build_bytes(mesh: &ControlMesh) -> BuildBytes {
+        let (corners, vertices) = (mesh.face_vertices.len(), mesh.positions.len());
+        let patches: usize = mesh.face_sizes.iter().map(|&n| if n == 4 { 1 } else { n as usize }).sum();
+        let mixed = if patches == mesh.n_faces() { 0 } else { 8 * mesh.n_faces() + corners / 4 };
+        let tex_coords = mesh.tex_coords.as_ref().map_or(0, TexCoords::bytes);
+        let surface = 8 * corners + 12 * vertices + vertices / 8 + 4 * mesh.n_faces() + mixed + tex_coords;
+        let tree = TREE_BYTES_PER_PATCH * patches;
+        let boxes = (size_of::<PatchId>() + size_of::<Bounds>() + BUILD_BYTES_PER_PATCH) * patches;
+        // First the pairing of half-edges, beside the polygons; then the tree's, without them.
+        let pairing = mesh.bytes() - tex_coords + 4 * (corners + vertices);
+        let n_slots = tree / BYTES_PER_SLOT;
+        BuildBytes {
+            tables: n_slots * 8 + n_slots / 8,
+            resident: surface + tree,
+            peak: (surface + pairing).max(surface + tree + boxes),
+        }
+    }
+
     /// Bytes held, for the whole render.
     pub fn bytes(&self) -> usize {
-        let tex_coords = self.tex_coords.as_ref().map_or(0, |t| 8 * t.values.len() + 4 * t.indices.len());
+        let tex_coords = self.tex_coords.as_ref().map_or(0, TexCoords::bytes);
         let visible = self.visible.as_ref().map_or(0, |v| 4 * v.len());
         self.surface.bytes() + self.top.bytes() + tex_coords + visible
     }
@@ -395,6 +432,11 @@ impl GridCache {
     pub fn patches_touched(&self) -> u64 {
         let words = self.touched.iter().flatten();
         words.map(|w| u64::from(w.load(Ordering::Relaxed).count_ones())).sum()
+    }
+
+    /// What [`table_bytes`](Self::table_bytes) will be for this world.
+    pub fn table_bytes_for(world: &World) -> usize {
+        world.meshes.iter().map(|m| m.top.n_slots()).map(|n| 8 * n + 8 * n.div_ceil(64)).sum()
     }
 
     /// Bytes of slots and marks, the arena not included.

@@ -25,12 +25,14 @@ mod elements;
 mod lines;
 mod tags;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
+use crate::io::process::resident_bytes;
 use crate::mesh::ControlMesh;
 use elements::MeshBuilder;
 use lines::{LogicalLines, words};
+use std::cell::Cell;
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 /// A mesh and what its reader had to pass over.
@@ -46,6 +48,57 @@ pub struct ObjMesh {
 pub fn read_obj(path: &Path) -> Result<ObjMesh> {
     let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
     parse_obj(BufReader::with_capacity(1 << 16, file), path)
+}
+
+/// As [`read_obj`], but stops as soon as the process has more than `limit` bytes resident.
+///
+/// # Errors
+/// Then of kind [`ErrorKind::Budget`], with what the file would take if it goes on as it began.
+pub fn read_obj_within(path: &Path, limit: u64) -> Result<ObjMesh> {
+    let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
+    let length = file.metadata().map_or(0, |m| m.len());
+    let (exceeded, at_start) = (Cell::new(None), resident_bytes().unwrap_or(0));
+    let watched = Watched { file, limit, n_read: 0, next_look: LOOK_EVERY, exceeded: &exceeded };
+    parse_obj(BufReader::with_capacity(1 << 16, watched), path).map_err(|error| match exceeded.get() {
+        None => error,
+        Some((n_read, resident)) => {
+            let so_far = resident.saturating_sub(at_start) as f64;
+            let whole = at_start + (so_far * length.max(n_read) as f64 / n_read as f64) as u64;
+            let part = 100 * n_read / length.max(n_read);
+            let [given, whole] = [limit >> 20, whole.div_ceil(1 << 20)];
+            let message =
+                format!("--memory {given}M is too little: {part} % of the file fill it; all of it takes {whole}M");
+            Error::new(ErrorKind::Budget, message).at(path, None)
+        }
+    })
+}
+
+/// Bytes of file between two looks at the memory.
+const LOOK_EVERY: u64 = 1 << 20;
+
+/// A file that refuses to be read on when too much memory is resident.
+struct Watched<'a> {
+    file: File,
+    limit: u64,
+    n_read: u64,
+    next_look: u64,
+    /// Bytes read and bytes resident when it was too much.
+    exceeded: &'a Cell<Option<(u64, u64)>>,
+}
+
+impl Read for Watched<'_> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        if self.n_read >= self.next_look {
+            self.next_look += LOOK_EVERY;
+            if let Some(resident) = resident_bytes().filter(|&n| n > self.limit) {
+                self.exceeded.set(Some((self.n_read, resident)));
+                return Err(io::ErrorKind::OutOfMemory.into());
+            }
+        }
+        let n = self.file.read(out)?;
+        self.n_read += n as u64;
+        Ok(n)
+    }
 }
 
 /// Reads OBJ text from anywhere; `path` is for messages.

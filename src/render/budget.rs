@@ -1,0 +1,104 @@
+//! One budget for the whole process: what is resident before tracing, what tracing needs besides the cache, and the
+//! cache, which gets the rest.
+//!
+//! ```text
+//!   budget ┌──────────────────────────┬───────┬──────┬─────────┬───────────────────────────────┐
+//!          │ resident: program, meshes│ slots │ film │ workers │ cache                         │
+//!          └──────────────────────────┴───────┴──────┴─────────┴───────────────────────────────┘
+//!            measured                   exact   exact  allowed    at least what writing the picture needs,
+//!                                                                 because the cache is gone by then
+//! ```
+
+use super::film::Film;
+use super::settings::RenderSettings;
+use crate::cache::SegmentCache;
+use crate::error::{Error, ErrorKind, Result};
+use std::fmt;
+
+/// Bytes that a worker may touch besides the cache: its stack, the scratch for blocks that are used once, evaluators,
+/// a tile of pixels, and what the allocator keeps for it.
+pub const WORKER_BYTES: usize = SegmentCache::SCRATCH_BYTES + (512 << 10);
+
+/// Bytes for everything too small to be counted: progress bar, statistics, code that was not run yet.
+const ODDS_AND_ENDS: u64 = 2 << 20;
+
+/// What a render holds, in bytes. The sum of all but `writing` stays from the first to the last ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RenderNeeds {
+    /// What is resident before tracing begins.
+    pub resident: u64,
+    /// Slots of the cache.
+    pub tables: u64,
+    /// The film.
+    pub film: u64,
+    /// All workers.
+    pub workers: u64,
+    /// What writing the picture takes once the cache is gone.
+    pub writing: u64,
+}
+
+impl RenderNeeds {
+    /// The needs of a render on `threads` threads, of a world that needs `tables` bytes of slots, when `resident` bytes
+    /// are resident.
+    pub fn new(resident: u64, tables: usize, settings: &RenderSettings, threads: usize) -> Self {
+        let film = Film::n_bytes(settings.window, &settings.aovs) as u64;
+        let workers = (WORKER_BYTES * threads) as u64;
+        // Channel by channel the film is copied once; encoders hold a copy of some lines in another form.
+        Self { resident, tables: tables as u64, film, workers, writing: 2 * film }
+    }
+
+    fn without_cache(&self) -> u64 {
+        self.resident + self.tables + self.film + self.workers + ODDS_AND_ENDS
+    }
+
+    /// The smallest budget that will do.
+    pub fn smallest_budget(&self) -> u64 {
+        self.without_cache() + self.writing
+    }
+
+    /// Bytes that `budget` leaves for the cache.
+    ///
+    /// # Errors
+    /// If the budget is too small; the message names the smallest that would do.
+    pub fn cache_bytes(&self, budget: u64) -> Result<u64> {
+        if budget < self.smallest_budget() {
+            return Err(too_small(budget, self.smallest_budget(), self));
+        }
+        Ok(budget - self.without_cache())
+    }
+}
+
+impl fmt::Display for RenderNeeds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [resident, tables, film, workers] = [self.resident, self.tables, self.film, self.workers].map(mebibytes);
+        write!(f, "program and meshes {resident}M, slots {tables}M, film {film}M, workers {workers}M")
+    }
+}
+
+/// The error of a budget below `smallest`, which is needed for `what`. Names a little more, because what is resident
+/// differs from run to run.
+pub fn too_small(budget: u64, smallest: u64, what: impl fmt::Display) -> Error {
+    let (given, smallest) = (mebibytes(budget), mebibytes(smallest + smallest / 32 + (1 << 20)));
+    let message = format!("--memory {given}M is too little; {smallest}M would do ({what}, cache as much as is left)");
+    Error::new(ErrorKind::Budget, message)
+}
+
+/// Rounded up.
+fn mebibytes(bytes: u64) -> u64 {
+    bytes.div_ceil(1 << 20)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_smallest_budget_named_is_accepted_and_one_less_refused() {
+        let needs = RenderNeeds::new(50 << 20, 1 << 20, &RenderSettings::of_size([100, 100]), 2);
+        let refusal = needs.cache_bytes(10 << 20).unwrap_err();
+        assert!(refusal.to_string().contains("M would do (program and meshes 50M, slots 1M"), "{refusal}");
+        let smallest = needs.smallest_budget();
+        assert!(needs.cache_bytes(smallest).unwrap() >= needs.writing);
+        assert!(needs.cache_bytes(smallest - 1).is_err());
+    }
+}

@@ -1,0 +1,68 @@
+//! Promise 1: the whole process stays within `--memory`, and too small a budget is refused with one that would do.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::Path;
+
+fn lazytess(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("lazytess").unwrap().current_dir(folder).args(arguments).assert()
+}
+
+fn folder_with_ground(faces: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    lazytess(folder.path(), &["generate", "ground", "--faces", faces, "-o", "ground.obj", "--quiet"]).success();
+    folder
+}
+
+const RENDER: [&str; 13] = [
+    "render",
+    "ground.obj",
+    "-o",
+    "g.exr",
+    "--size",
+    "160x120",
+    "--rate",
+    "fixed:32",
+    "--integrator",
+    "ao",
+    "--quiet",
+    "--threads",
+    "2",
+];
+
+/// Renders within the budget and returns the statistics.
+fn render_within(folder: &Path, budget: &str) -> Value {
+    lazytess(folder, &[&RENDER[..], &["--stats", "s.json", "--memory", budget]].concat()).success();
+    serde_json::from_slice(&std::fs::read(folder.join("s.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn the_whole_process_stays_within_its_budget() {
+    let folder = folder_with_ground("40k");
+    for megabytes in [64, 96] {
+        let statistics = render_within(folder.path(), &format!("{megabytes}M"));
+        let budget = f64::from(megabytes << 20);
+        let peak = statistics["memory"]["peak_resident_bytes"].as_f64().unwrap();
+        assert!(peak <= 1.05 * budget, "{peak} of {budget}");
+        // The budget is used, not just kept.
+        let (used, capacity) = (&statistics["cache"]["peak_bytes"], &statistics["cache"]["capacity_bytes"]);
+        assert!(capacity.as_f64().unwrap() > 0.3 * budget, "{capacity}");
+        assert!(used.as_f64().unwrap() > 0.9 * capacity.as_f64().unwrap(), "{used} of {capacity}");
+    }
+}
+
+#[test]
+fn too_small_a_budget_is_refused_with_one_that_does() {
+    let folder = folder_with_ground("40k");
+    let refused = |budget: &str| {
+        let refusal = lazytess(folder.path(), &[&RENDER[..], &["--memory", budget]].concat()).code(2);
+        String::from_utf8(refusal.get_output().stderr.clone()).unwrap()
+    };
+    let message = refused("12M");
+    let named = message.split("; ").nth(1).and_then(|rest| rest.split_once(" would do")).expect("a size is named").0;
+    let statistics = render_within(folder.path(), named);
+    let budget = named.trim_end_matches('M').parse::<f64>().unwrap() * (1 << 20) as f64;
+    assert!(statistics["memory"]["peak_resident_bytes"].as_f64().unwrap() <= 1.05 * budget);
+    assert!(refused("1M").contains("of the file fill it; all of it takes"));
+    assert!(!folder.path().join("none.exr").exists());
+}
