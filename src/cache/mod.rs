@@ -86,6 +86,8 @@
 //! Idea: Benthin et al., "Efficient Ray Tracing of Subdivision Surfaces using Tessellation Caching", HPG 2015, whose
 //! cache makes all threads stop to recycle a segment; the pins are Fraser's epochs (2004) with a grace period.
 //!
+//! What other sizes would do is replayed from a **trace** of accesses (`trace.rs`, `replay.rs`).
+//!
 //! Read `pin.rs` first, then `segment.rs`, then `ticket.rs`.
 
 mod block;
@@ -94,6 +96,7 @@ mod memory;
 mod pin;
 #[cfg(all(test, not(loom)))]
 mod reference;
+mod replay;
 mod scratch;
 mod segment;
 mod slot;
@@ -102,14 +105,17 @@ mod sync;
 #[cfg(all(test, not(loom)))]
 mod tests;
 mod ticket;
+mod trace;
 mod word;
 
 pub use block::{Block, BlockLayout};
 pub use config::{CacheConfig, Capacity};
 pub use pin::{Pin, Visit};
+pub use replay::{Policy, Replay, Replayed};
 pub use slot::{Slot, SlotId, SlotTable};
 pub use stats::CacheStatistics;
 pub use ticket::{Claim, Ticket};
+pub use trace::{Recorder, TraceLog};
 
 use crate::error::{Error, ErrorKind, Result};
 use config::RingShape;

@@ -23,6 +23,7 @@ pub mod run_options;
 pub mod sample;
 pub mod stdout;
 pub mod tessellate;
+pub mod tune;
 pub mod values;
 
 use crate::error::{Error, Result};
@@ -50,6 +51,7 @@ enum Command {
     Sample(sample::SampleArgs),
     Tessellate(tessellate::TessellateArgs),
     Bench(bench::BenchArgs),
+    Tune(tune::TuneArgs),
     Info(info::InfoArgs),
     Check(check::CheckArgs),
     Compare(compare::CompareArgs),
@@ -64,6 +66,7 @@ impl Cli {
             Command::Sample(args) => args.run(),
             Command::Tessellate(args) => args.run(),
             Command::Bench(args) => args.run(),
+            Command::Tune(args) => args.run(),
             Command::Info(args) => args.run(),
             Command::Check(args) => args.run(),
             Command::Compare(args) => args.run(),

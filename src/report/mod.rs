@@ -5,11 +5,14 @@
 //! is written.
 
 pub mod inventory;
+pub mod plot;
 mod quantity;
 pub mod statistics;
 pub mod summary;
+pub mod tuning;
 
 pub use inventory::{CacheAdvice, Inventory};
 pub use statistics::{
     CacheReport, GeometryReport, MemoryReport, PhaseSeconds, PictureReport, RayReport, RenderStatistics, Seconds,
 };
+pub use tuning::{CurvePoint, RecordedRender, Tuning};

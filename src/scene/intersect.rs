@@ -6,7 +6,7 @@
 
 use super::accel::TraversalStack;
 use super::world::{GridCache, World, WorldMesh};
-use crate::cache::{Block, BlockLayout, Claim, Pin, Slot, SlotId, Visit};
+use crate::cache::{Block, BlockLayout, Claim, Pin, Recorder, Slot, SlotId, TraceLog, Visit};
 use crate::grid::{
     CellRect, LaneHits, LatticeHit, LatticeRay, MAX_CELLS, NODE_BYTES, NodeView, PieceLayout, PieceView, TriangleId,
     encode_node, is_node,
@@ -28,14 +28,14 @@ pub struct Intersector<'w> {
     world: &'w World,
     cache: &'w GridCache,
     pin: Pin<'w>,
-    builder: Builder,
+    builder: Builder<'w>,
     shading: NormalScratch,
     stacks: Stacks,
 }
 
 /// What building a block needs.
 #[derive(Default)]
-struct Builder {
+struct Builder<'w> {
     dicer: Dicer,
     vertices: Vec<[i32; 3]>,
     boxes: Vec<Bounds>,
@@ -44,6 +44,8 @@ struct Builder {
     n_built: u64,
     n_pieces: u64,
     n_triangles: u64,
+    /// Notes every block that is asked for, if the cache wants to know.
+    recorder: Option<Recorder<'w>>,
 }
 
 /// Evaluates normals; remembers the last patch, which shading asks about again and again.
@@ -97,14 +99,26 @@ fn child_cells(parent: CellRect, side: u32, a: u32, b: u32) -> CellRect {
     }
 }
 
-impl Builder {
-    /// The block of a slot, built if it is missing.
+impl Builder<'_> {
+    /// The block of child `lane` of a node, built if it is missing.
     #[inline(always)]
-    fn fetch<'v>(&mut self, visit: &'v Visit<'_>, slot: Slot<'v>, of: PatchContext<'_>, cells: CellRect) -> Block<'v> {
-        match visit.get(slot) {
+    fn fetch_child<'v>(
+        &mut self,
+        visit: &'v Visit<'_>,
+        of: PatchContext<'_>,
+        node: &Level<'v>,
+        lane: usize,
+        level: usize,
+    ) -> Block<'v> {
+        let (slot, cells) = node.child(lane);
+        let block = match visit.get(slot) {
             Some(block) => block,
             None => self.build(visit, slot, of, cells),
+        };
+        if let Some(recorder) = &mut self.recorder {
+            recorder.child(level, lane, &block);
         }
+        block
     }
 
     #[cold]
@@ -161,18 +175,28 @@ impl Builder {
         visit: &'v Visit<'_>,
         slot: Slot<'v>,
         of: PatchContext<'_>,
-        touch: impl Fn(),
+        cache: &GridCache,
+        leaf_slot: u32,
     ) -> Block<'v> {
-        match visit.get(slot) {
+        let block = match visit.get(slot) {
             Some(block) => block,
             None => {
-                touch();
+                cache.touch(of.id, leaf_slot);
                 let rates = of.mesh.patch_rates(of.patch);
                 let cells = CellRect { i0: 0, j0: 0, i1: rates.n_u as u16, j1: rates.n_v as u16 };
                 self.build(visit, slot, of, cells)
             }
+        };
+        if let Some(recorder) = &mut self.recorder {
+            recorder.root(name_of(of.id, leaf_slot), &block);
         }
+        block
     }
+}
+
+/// One number for a slot of any mesh.
+fn name_of(mesh: MeshId, slot: u32) -> u64 {
+    u64::from(mesh.0) << 32 | u64::from(slot)
 }
 
 /// A node on the way down a patch, and which of its children are still to be seen.
@@ -223,7 +247,7 @@ impl Task for ClosestInMesh<'_, '_> {
         {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
-            let root = builder.fetch_root(&visit, slot, of, || cache.touch(id, leaf.slot));
+            let root = builder.fetch_root(&visit, slot, of, cache, leaf.slot);
             closest_in_patch(kernel, builder, &visit, root, of, ray, hit);
         }
     }
@@ -232,7 +256,7 @@ impl Task for ClosestInMesh<'_, '_> {
 #[inline(always)]
 fn closest_in_patch<K: Kernel>(
     kernel: K,
-    builder: &mut Builder,
+    builder: &mut Builder<'_>,
     visit: &Visit<'_>,
     root: Block<'_>,
     of: PatchContext<'_>,
@@ -254,8 +278,7 @@ fn closest_in_patch<K: Kernel>(
             depth -= 1;
             continue;
         };
-        let (slot, cells) = level.child(lane);
-        let block = builder.fetch(visit, slot, of, cells);
+        let block = builder.fetch_child(visit, of, level, lane, depth + 1);
         if is_node(block.bytes()) {
             depth += 1;
             levels[depth] = Some(Level::new(kernel, block, ray, hit.t));
@@ -285,7 +308,7 @@ impl Task for OccludedInMesh<'_, '_> {
         while let Some(leaf) = walk.any(kernel, ray, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
-            let root = builder.fetch_root(&visit, slot, of, || cache.touch(id, leaf.slot));
+            let root = builder.fetch_root(&visit, slot, of, cache, leaf.slot);
             if occluded_in_patch(kernel, builder, &visit, root, of, ray) {
                 return true;
             }
@@ -297,7 +320,7 @@ impl Task for OccludedInMesh<'_, '_> {
 #[inline(always)]
 fn occluded_in_patch<K: Kernel>(
     kernel: K,
-    builder: &mut Builder,
+    builder: &mut Builder<'_>,
     visit: &Visit<'_>,
     root: Block<'_>,
     of: PatchContext<'_>,
@@ -317,8 +340,7 @@ fn occluded_in_patch<K: Kernel>(
             depth -= 1;
             continue;
         };
-        let (slot, cells) = level.child(lane);
-        let block = builder.fetch(visit, slot, of, cells);
+        let block = builder.fetch_child(visit, of, level, lane, depth + 1);
         if is_node(block.bytes()) {
             depth += 1;
             levels[depth] = Some(Level::new(kernel, block, ray, ray.t_max()));
@@ -337,7 +359,7 @@ impl<'w> Intersector<'w> {
             world,
             cache,
             pin,
-            builder: Builder::default(),
+            builder: Builder { recorder: cache.trace().map(TraceLog::recorder), ..Default::default() },
             shading: NormalScratch::default(),
             stacks: Stacks::default(),
         }

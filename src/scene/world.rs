@@ -3,7 +3,7 @@
 use super::accel::{BUILD_BYTES_PER_PATCH, TopLevel};
 use super::description::MeshDescription;
 use super::rate::DicingRate;
-use crate::cache::{CacheConfig, SegmentCache, SlotTable};
+use crate::cache::{CacheConfig, SegmentCache, SlotTable, TraceLog};
 use crate::error::{Error, Result};
 use crate::grid::MAX_CELLS;
 use crate::ids::{MeshId, PatchId};
@@ -376,6 +376,7 @@ pub struct GridCache {
     touched: Vec<Box<[AtomicU64]>>,
     triangles_built: AtomicU64,
     pieces_built: AtomicU64,
+    trace: Option<TraceLog>,
 }
 
 impl GridCache {
@@ -390,8 +391,19 @@ impl GridCache {
             touched: n_slots().map(bits).collect(),
             triangles_built: AtomicU64::new(0),
             pieces_built: AtomicU64::new(0),
+            trace: None,
             segments,
         })
+    }
+
+    /// Lets all tracers made from now on record the blocks that they ask for.
+    pub fn record(&mut self, log: TraceLog) {
+        self.trace = Some(log);
+    }
+
+    /// What was recorded by tracers that have ended.
+    pub fn trace(&self) -> Option<&TraceLog> {
+        self.trace.as_ref()
     }
 
     /// The memory and its counters.
