@@ -78,7 +78,8 @@ fn stats(folder: &Path) -> serde_json::Value {
 fn threads_and_caches_do_not_change_a_byte() {
     let folder = folder();
     for integrator in ["whitted", "ao --ao-samples 3", "path --max-depth 3", "debug:normal"] {
-        let line = format!("scene.toml -o out.exr --aov Z,N,mesh,patch,uv,samples --integrator {integrator}");
+        let line =
+            format!("scene.toml -o out.exr --size 40x30 --aov Z,N,mesh,patch,uv,samples --integrator {integrator}");
         let expected = bytes(folder.path(), &format!("{line} --cache unbounded --threads 1"));
         for run in [
             "--cache unbounded --threads 2",
