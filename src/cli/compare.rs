@@ -1,6 +1,7 @@
 //! `lazytess compare`: how far one picture is from another.
 
 use super::stdout::print;
+use super::values::display_units;
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::difference::DifferenceMap;
 use crate::image::display::display_value;
@@ -61,16 +62,6 @@ impl CompareArgs {
 
 fn borrow(picture: &RgbPicture) -> Result<LinearImage<'_>> {
     LinearImage::new(picture.width, &picture.pixels)
-}
-
-/// A number from 0 up, or a fraction of two.
-fn display_units(text: &str) -> Result<f32, String> {
-    let (above, below) = text.split_once('/').unwrap_or((text, "1"));
-    let number = |text: &str| text.trim().parse::<f32>().ok();
-    let value = number(above).zip(number(below)).map(|(above, below)| above / below);
-    value
-        .filter(|v| v.is_finite() && *v >= 0.0)
-        .ok_or_else(|| format!("'{text}' is no difference: write a number from 0 up, such as 0.02 or 5/255"))
 }
 
 #[cfg(test)]

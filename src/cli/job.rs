@@ -9,7 +9,10 @@ use crate::error::Result;
 use crate::io::process::{self, Stopwatch};
 use crate::mesh::ControlMesh;
 use crate::render::budget::{RenderNeeds, too_small};
-use crate::render::settings::{self, Appearance, RenderSettings, RunSettings};
+use crate::render::adaptive::render_adaptive;
+use crate::render::item_buffer::ItemBuffer;
+use crate::render::settings::{self, Appearance, Groups, RenderSettings, RunSettings};
+use crate::render::thesis::{Interpolation, render_thesis};
 use crate::render::workers::{Rendered, render};
 use crate::report::PhaseSeconds;
 use crate::scene::camera::Camera;
@@ -127,15 +130,23 @@ impl Prepared<'_> {
     }
 
     /// Renders, with a progress bar where one can be seen.
-    pub fn render(&self, cache: &GridCache, threads: usize, quiet: bool, cancel: &AtomicBool) -> Rendered {
+    pub fn render(&self, cache: &GridCache, threads: usize, quiet: bool, cancel: &AtomicBool) -> Result<Rendered> {
         let materials = self.scene.meshes.iter().map(|m| m.material.clone()).collect();
         let appearance = Appearance::new(materials, self.scene.lights.clone(), self.scene.background);
         let progress = Progress::new("pixels", quiet);
         let report = |p: settings::Progress| progress.set(p.done, p.total);
         let run = RunSettings { progress: &report, ..RunSettings::quiet(threads, cancel) };
         let make_tracer = || Intersector::new(&self.world, cache);
-        let rendered = render(&self.camera, &appearance, self.settings, &run, make_tracer);
+        let (camera, settings) = (&self.camera, self.settings);
+        let rendered = match settings.groups {
+            Groups::Off => render(camera, &appearance, settings, &run, make_tracer),
+            Groups::Adaptive => render_adaptive(&self.world, camera, &appearance, settings, &run, make_tracer),
+            Groups::Thesis => {
+                let items = ItemBuffer::new(&self.world, camera, settings, 1, threads)?;
+                render_thesis(camera, &appearance, settings, &run, &items, Interpolation::Bilinear, make_tracer)
+            }
+        };
         progress.finish();
-        rendered
+        Ok(rendered)
     }
 }

@@ -2,9 +2,9 @@
 
 use super::PICTURE;
 use super::camera::CameraArgs;
-use super::values::{count, crop, picture_size};
+use super::values::{count, crop, display_units, picture_size};
 use crate::error::{Error, Result};
-use crate::render::{Aov, PixelRect, RenderSettings};
+use crate::render::{Aov, Groups, PixelRect, RenderSettings};
 use crate::scene::description::{IntegratorKind, Rate, SceneDescription};
 use clap::Args;
 
@@ -35,6 +35,12 @@ pub struct PictureArgs {
     /// Render only columns x0 to x1 - 1 and rows y0 to y1 - 1, with the values they have in the whole picture
     #[arg(long, value_name = "x0,x1,y0,y1", value_parser = crop, help_heading = PICTURE)]
     pub crop: Option<[u32; 4]>,
+    /// Trace every pixel (off), only those that need it (adaptive), or corners of patches (thesis, unchecked)
+    #[arg(long, value_name = "off|thesis|adaptive", default_value_t = Groups::Off, help_heading = PICTURE)]
+    pub groups: Groups,
+    /// Error that --groups adaptive may make, in display units (0 to 1 after sRGB); reads like 0.02 or 5/255; 0 is off
+    #[arg(long, value_name = "E", default_value = "2/255", value_parser = display_units, help_heading = PICTURE)]
+    pub tolerance: f32,
     /// The camera
     #[command(flatten)]
     pub camera: CameraArgs,
@@ -56,6 +62,8 @@ impl PictureArgs {
             ao_samples: self.ao_samples.or(scene.render.ao_samples).unwrap_or(base.ao_samples),
             seed: self.seed,
             aovs,
+            groups: self.groups,
+            tolerance: self.tolerance,
             ..base
         })
     }

@@ -138,7 +138,7 @@ impl RenderJob {
         let size = self.memory.map_or(Ok(self.cache), |budget| prepared.cache_within(budget, self.threads))?;
         let cache = prepared.cache(size, self.threads)?;
         let watch = Stopwatch::start();
-        let rendered = prepared.render(&cache, self.threads, self.quiet, &cancel);
+        let rendered = prepared.render(&cache, self.threads, self.quiet, &cancel)?;
         prepared.seconds.render = watch.seconds().into();
         if rendered.film.n_done() == 0 {
             let message = format!("interrupted before the first pixel: {} is as it was", self.output.display());

@@ -96,6 +96,16 @@ pub fn count(text: &str) -> Result<u32, String> {
     text.parse().ok().filter(|&n| n > 0).ok_or_else(|| format!("'{text}' is no count: write a whole number from 1 up"))
 }
 
+/// A number from 0 up, or a fraction of two.
+pub fn display_units(text: &str) -> Result<f32, String> {
+    let (above, below) = text.split_once('/').unwrap_or((text, "1"));
+    let number = |text: &str| text.trim().parse::<f32>().ok();
+    let value = number(above).zip(number(below)).map(|(above, below)| above / below);
+    value
+        .filter(|v| v.is_finite() && *v >= 0.0)
+        .ok_or_else(|| format!("'{text}' is no difference: write a number from 0 up, such as 0.02 or 5/255"))
+}
+
 /// Exactly `N` values between commas.
 fn numbers<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
     let values: Option<Vec<T>> = text.split(',').map(|part| part.trim().parse().ok()).collect();

@@ -1,5 +1,7 @@
 //! The film: colour and AOVs of a window of pixels.
 
+use super::groups::NO_GROUP;
+use super::reason::Reason;
 use super::tiles::PixelRect;
 use std::str::FromStr;
 
@@ -16,15 +18,21 @@ pub enum Aov {
     Patch,
     /// Patch parameters, each in 0..=1; zero where nothing is hit.
     Uv,
-    /// Number of samples taken.
+    /// Number of samples taken; 0 where none was traced.
     Samples,
     /// Number of blocks built while the pixel was rendered. Unlike everything else it depends on timing.
     Misses,
+    /// Number of the pixel's group; [`NO_GROUP`] where there is none.
+    Group,
+    /// Number of the pixel's [`Reason`].
+    Reason,
+    /// How far probes were from the interpolation that gave the pixel, in display units; zero where it was traced.
+    Error,
 }
 
 impl Aov {
     /// Every AOV with its name on the command line.
-    pub const ALL: [(&'static str, Self); 7] = [
+    pub const ALL: [(&'static str, Self); 10] = [
         ("Z", Self::Depth),
         ("N", Self::Normal),
         ("mesh", Self::Mesh),
@@ -32,6 +40,9 @@ impl Aov {
         ("uv", Self::Uv),
         ("samples", Self::Samples),
         ("miss", Self::Misses),
+        ("group", Self::Group),
+        ("reason", Self::Reason),
+        ("error", Self::Error),
     ];
 
     /// Layer name and channel names in files; the layer of plain channels has an empty name.
@@ -44,6 +55,9 @@ impl Aov {
             Self::Uv => ("uv", &["u", "v"]),
             Self::Samples => ("", &["samples"]),
             Self::Misses => ("", &["miss"]),
+            Self::Group => ("", &["group"]),
+            Self::Reason => ("", &["reason"]),
+            Self::Error => ("", &["error"]),
         }
     }
 }
@@ -89,12 +103,26 @@ impl FirstHit {
 pub struct PixelRecord {
     /// Mean radiance, linear RGB.
     pub color: [f32; 3],
-    /// See [`Aov::Samples`]; at least 1.
+    /// See [`Aov::Samples`].
     pub samples: u32,
     /// Geometry of sample 0.
     pub first: FirstHit,
     /// See [`Aov::Misses`].
     pub misses: u32,
+    /// See [`Aov::Group`].
+    pub group: u32,
+    /// Why it was traced, or that it was not.
+    pub reason: Reason,
+    /// See [`Aov::Error`].
+    pub error: f32,
+}
+
+impl PixelRecord {
+    /// A pixel that shows the background and for which nothing was traced.
+    pub fn background(color: [f32; 3]) -> Self {
+        let first = FirstHit::NONE;
+        Self { color, samples: 0, first, misses: 0, group: NO_GROUP, reason: Reason::Background, error: 0.0 }
+    }
 }
 
 /// The stored samples of one AOV, a vector per channel, each row by row over the film's window.
@@ -111,8 +139,9 @@ impl PlaneData {
         match aov {
             Aov::Depth => Self::Float(vec![vec![f32::INFINITY; n_pixels]]),
             Aov::Normal | Aov::Uv => Self::Float(vec![vec![0.0; n_pixels]; aov.channels().1.len()]),
-            Aov::Mesh | Aov::Patch => Self::Id(vec![FirstHit::NO_ID; n_pixels]),
-            Aov::Samples | Aov::Misses => Self::Id(vec![0; n_pixels]),
+            Aov::Error => Self::Float(vec![vec![0.0; n_pixels]]),
+            Aov::Mesh | Aov::Patch | Aov::Group => Self::Id(vec![FirstHit::NO_ID; n_pixels]),
+            Aov::Samples | Aov::Misses | Aov::Reason => Self::Id(vec![0; n_pixels]),
         }
     }
 
@@ -124,6 +153,8 @@ impl PlaneData {
                     Aov::Mesh => first.mesh,
                     Aov::Patch => first.patch,
                     Aov::Samples => record.samples,
+                    Aov::Group => record.group,
+                    Aov::Reason => record.reason as u32,
                     _ => record.misses,
                 }
             }
@@ -131,6 +162,7 @@ impl PlaneData {
                 let values: &[f32] = match aov {
                     Aov::Depth => &[first.depth],
                     Aov::Normal => &first.normal,
+                    Aov::Error => &[record.error],
                     _ => &first.uv,
                 };
                 channels.iter_mut().zip(values).for_each(|(channel, &value)| channel[idx] = value);
@@ -215,7 +247,8 @@ mod tests {
         let window = PixelRect { x0: 10, y0: 20, x1: 13, y1: 22 };
         let mut film = Film::new(window, &[Aov::Patch, Aov::Normal, Aov::Samples]);
         let first = FirstHit { patch: 7, normal: [0.0, 1.0, 0.0], ..FirstHit::NONE };
-        film.set([11, 21], &PixelRecord { color: [1.0, 2.0, 3.0], samples: 4, first, misses: 0 });
+        let background = PixelRecord::background([1.0, 2.0, 3.0]);
+        film.set([11, 21], &PixelRecord { samples: 4, first, ..background });
         assert_eq!((film.n_done(), film.done()[4], film.colors()[4]), (1, true, [1.0, 2.0, 3.0]));
         let id = FirstHit::NO_ID;
         assert_eq!(film.plane(Aov::Patch), Some(&PlaneData::Id(vec![id, id, id, id, 7, id])));

@@ -17,24 +17,37 @@
 //! 2. Nothing is allocated per ray, pixel or tile.
 //! 3. Colours are linear RGB radiance; the film never tone maps.
 //!
-//! Read [`tracer`] first, then [`integrators`], [`film`] and [`workers`].
+//! With **pixel groups** most pixels are not traced: an [`item_buffer`] of proxies, [`groups`] of equal pixels and their
+//! interpolation are Ke's published algorithm ([`thesis`]); [`footprint`] and [`adaptive`] are ours, with a bounded error.
+//!
+//! Read [`tracer`] first, then [`integrators`], [`film`] and [`workers`]; then [`adaptive`].
 
+pub mod adaptive;
 #[cfg(test)]
 mod analytic;
 pub mod budget;
+mod cells;
 pub mod film;
+pub mod footprint;
+pub mod groups;
 pub mod integrators;
+pub mod interpolate;
+pub mod item_buffer;
 mod lazy;
+mod patches;
 pub mod rays;
+pub mod reason;
 pub mod sampler;
 pub mod settings;
+pub mod thesis;
 pub mod tiles;
 pub mod tracer;
 pub mod workers;
 
 pub use film::{Aov, Film, FirstHit, PixelRecord, PlaneData};
 pub use rays::{RayCounts, RayKind};
-pub use settings::{Appearance, Progress, RenderSettings, RunSettings};
+pub use reason::{PixelCounts, Reason};
+pub use settings::{Appearance, Groups, Progress, RenderSettings, RunSettings};
 pub use tiles::{PixelRect, TileOrder};
 pub use tracer::{SurfacePoint, Tracer};
 pub use workers::{Rendered, render};

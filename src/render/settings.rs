@@ -5,6 +5,8 @@ use super::tiles::PixelRect;
 use crate::scene::description::{IntegratorKind, Light, Material};
 use crate::scene::light::sky_radiance;
 use glam::Vec3;
+use std::fmt;
+use std::str::FromStr;
 use std::sync::atomic::AtomicBool;
 
 /// What the picture is. Equal settings and scenes give equal bytes.
@@ -26,6 +28,44 @@ pub struct RenderSettings {
     pub seed: u32,
     /// What to store besides colour.
     pub aovs: Vec<Aov>,
+    /// Which pixels are traced.
+    pub groups: Groups,
+    /// Largest error that `groups` aims at, in display units: 0 to 1 after clamping and sRGB. 0 traces every pixel.
+    pub tolerance: f32,
+}
+
+/// Which pixels are traced; the others are interpolated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Groups {
+    /// All.
+    #[default]
+    Off,
+    /// The four corners of every group of pixels that show the same patch: the published algorithm.
+    Thesis,
+    /// Those that differ from their surroundings, and enough others to know that.
+    Adaptive,
+}
+
+impl Groups {
+    /// Every choice with its name on the command line.
+    pub const ALL: [(&'static str, Self); 3] =
+        [("off", Self::Off), ("thesis", Self::Thesis), ("adaptive", Self::Adaptive)];
+}
+
+impl fmt::Display for Groups {
+    /// Its name on the command line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(Self::ALL.iter().find(|(_, groups)| groups == self).map_or("", |(name, _)| name))
+    }
+}
+
+impl FromStr for Groups {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let known = Self::ALL.iter().find(|(name, _)| *name == text).map(|&(_, groups)| groups);
+        known.ok_or_else(|| format!("'{text}' is no way of grouping pixels: choose off, thesis or adaptive"))
+    }
 }
 
 impl RenderSettings {
@@ -40,6 +80,8 @@ impl RenderSettings {
             ao_samples: 16,
             seed: 0,
             aovs: Vec::new(),
+            groups: Groups::Off,
+            tolerance: 2.0 / 255.0,
         }
     }
 }

@@ -1,12 +1,15 @@
 //! The threads that render tiles.
 
 use super::film::{Film, PixelRecord};
-use super::integrators::Shader;
+use super::groups::NO_GROUP;
+use super::integrators::{Sample, Shader};
 use super::rays::RayCounts;
+use super::reason::{PixelCounts, Reason};
 use super::sampler::{Sampler, subpixel};
 use super::settings::{Appearance, Progress, RenderSettings, RunSettings};
 use super::tiles::{PixelRect, TileOrder};
 use super::tracer::Tracer;
+use crate::math::Ray;
 use crate::scene::camera::Camera;
 use glam::{DVec2, DVec3};
 use parking_lot::Mutex;
@@ -19,11 +22,26 @@ pub struct Rendered {
     pub film: Film,
     /// Rays traced.
     pub rays: RayCounts,
+    /// Pixels by why they were traced, or not.
+    pub pixels: PixelCounts,
+    /// What grouping took.
+    pub seconds: GroupSeconds,
     /// Whether every pixel is done; false after a cancellation.
     pub complete: bool,
 }
 
-/// Renders a picture. Each worker thread calls `make_tracer` once and drops its tracer when no tile is left.
+/// Time spent on groups, summed over threads but for `prepare`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GroupSeconds {
+    /// Finding out what might be seen where, by the clock.
+    pub prepare: f64,
+    /// Tracing and shading rays.
+    pub trace: f64,
+    /// Interpolating the other pixels.
+    pub interpolate: f64,
+}
+
+/// Renders a picture, every pixel. Each worker thread calls `make_tracer` once and drops its tracer when no tile is left.
 pub fn render<T: Tracer>(
     camera: &Camera,
     appearance: &Appearance,
@@ -31,55 +49,56 @@ pub fn render<T: Tracer>(
     run: &RunSettings<'_>,
     make_tracer: impl Fn() -> T + Sync,
 ) -> Rendered {
-    let job = Job {
-        camera,
-        appearance,
-        settings,
-        run,
-        order: TileOrder::new(settings.window, run.tile_side),
-        next: AtomicU64::new(0),
-        n_done: AtomicUsize::new(0),
-        film: Mutex::new(Film::new(settings.window, &settings.aovs)),
-    };
-    let mut rays = RayCounts::default();
-    std::thread::scope(|scope| {
-        let work = || job.work(&mut make_tracer());
-        let workers: Vec<_> = (0..run.threads).map(|_| scope.spawn(work)).collect();
-        for worker in workers {
-            rays += worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        }
-    });
-    let complete = job.n_done.into_inner() == settings.window.n_pixels();
-    Rendered { film: job.film.into_inner(), rays, complete }
-}
-
-/// What the workers share.
-struct Job<'a> {
-    camera: &'a Camera,
-    appearance: &'a Appearance,
-    settings: &'a RenderSettings,
-    run: &'a RunSettings<'a>,
-    order: TileOrder,
-    next: AtomicU64,
-    n_done: AtomicUsize,
-    film: Mutex<Film>,
-}
-
-impl Job<'_> {
-    fn work<T: Tracer>(&self, tracer: &mut T) -> RayCounts {
-        let mut shader = Shader::new(tracer, self.appearance, self.settings);
-        let tile_pixels = (self.run.tile_side as usize).pow(2).min(self.settings.window.n_pixels());
-        let mut records = Vec::with_capacity(tile_pixels);
-        while let Some(tile) = self.next_tile() {
+    let film = Mutex::new(Film::new(settings.window, &settings.aovs));
+    let queue = TileQueue::new(settings.window, run.tile_side, run);
+    let pixels = PixelTracer { camera, settings };
+    let counts = in_threads(run.threads, || {
+        let mut tracer = make_tracer();
+        let mut shader = Shader::new(&mut tracer, appearance, settings);
+        let mut records = Vec::with_capacity((run.tile_side as usize).pow(2).min(settings.window.n_pixels()));
+        while let Some(tile) = queue.next_tile() {
             records.clear();
-            records.extend(tile.pixels().map(|pixel| self.pixel(&mut shader, pixel)));
-            self.film.lock().store(tile, &records);
-            self.report(tile);
+            records.extend(tile.pixels().map(|pixel| pixels.trace(&mut shader, pixel)));
+            film.lock().store(tile, &records);
+            queue.report(tile.n_pixels());
         }
         shader.rays()
+    });
+    let mut rays = RayCounts::default();
+    counts.into_iter().for_each(|counts| rays += counts);
+    let film = film.into_inner();
+    let mut pixels = PixelCounts::default();
+    pixels.add(Reason::Every, film.n_done() as u64);
+    Rendered { complete: film.n_done() == settings.window.n_pixels(), film, rays, pixels, seconds: Default::default() }
+}
+
+/// Runs `work` on `threads` threads; returns what they return.
+pub(super) fn in_threads<R: Send>(threads: usize, work: impl Fn() -> R + Sync) -> Vec<R> {
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(&work)).collect();
+        let join = |worker: std::thread::ScopedJoinHandle<'_, R>| {
+            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        workers.into_iter().map(join).collect()
+    })
+}
+
+/// Hands out tiles until there are no more, or the render is cancelled.
+pub(super) struct TileQueue<'a> {
+    run: &'a RunSettings<'a>,
+    order: TileOrder,
+    total: usize,
+    next: AtomicU64,
+    n_done: AtomicUsize,
+}
+
+impl<'a> TileQueue<'a> {
+    pub fn new(window: PixelRect, tile_side: u32, run: &'a RunSettings<'a>) -> Self {
+        let order = TileOrder::new(window, tile_side);
+        Self { run, order, total: window.n_pixels(), next: AtomicU64::new(0), n_done: AtomicUsize::new(0) }
     }
 
-    fn next_tile(&self) -> Option<PixelRect> {
+    pub fn next_tile(&self) -> Option<PixelRect> {
         while !self.run.cancel.load(Ordering::Relaxed) {
             // The counter hands out numbers and orders nothing else, so `Relaxed` suffices.
             let position = self.next.fetch_add(1, Ordering::Relaxed);
@@ -93,20 +112,39 @@ impl Job<'_> {
         None
     }
 
-    fn report(&self, tile: PixelRect) {
-        let done = self.n_done.fetch_add(tile.n_pixels(), Ordering::Relaxed) + tile.n_pixels();
-        (self.run.progress)(Progress { done, total: self.settings.window.n_pixels() });
+    pub fn report(&self, n_pixels: usize) {
+        let done = self.n_done.fetch_add(n_pixels, Ordering::Relaxed) + n_pixels;
+        (self.run.progress)(Progress { done, total: self.total });
+    }
+}
+
+/// Traces whole pixels.
+#[derive(Clone, Copy)]
+pub(super) struct PixelTracer<'a> {
+    pub camera: &'a Camera,
+    pub settings: &'a RenderSettings,
+}
+
+impl PixelTracer<'_> {
+    /// All samples of a pixel.
+    pub fn trace<T: Tracer>(&self, shader: &mut Shader<'_, T>, pixel: [u32; 2]) -> PixelRecord {
+        self.trace_from(shader, pixel, None)
     }
 
-    fn pixel<T: Tracer>(&self, shader: &mut Shader<'_, T>, pixel: [u32; 2]) -> PixelRecord {
+    /// All samples of a pixel whose first sample may have been traced, with so many misses, before.
+    pub fn trace_from<T: Tracer>(
+        &self,
+        shader: &mut Shader<'_, T>,
+        pixel: [u32; 2],
+        known: Option<(Sample, u32)>,
+    ) -> PixelRecord {
         let _witness = PanicWitness(pixel);
         let misses_before = shader.misses();
-        let [x, y] = pixel.map(f64::from);
-        let mut sum = DVec3::ZERO;
-        let mut first = None;
-        for i in 0..self.settings.spp {
-            let ray = self.camera.ray(DVec2::new(x, y) + subpixel(i), self.settings.size);
-            let sample = shader.sample(self.camera, ray, Sampler::new(self.settings.seed, pixel, i));
+        let mut sum = known.map_or(DVec3::ZERO, |(sample, _)| sample.radiance.as_dvec3());
+        let mut first = known.map(|(sample, _)| sample.first);
+        for i in u32::from(known.is_some())..self.settings.spp {
+            let (ray, sampler) = self.sample(pixel, i);
+            let sample = shader.sample(self.camera, ray, sampler);
             sum += sample.radiance.as_dvec3();
             first.get_or_insert(sample.first);
         }
@@ -114,13 +152,23 @@ impl Job<'_> {
             color: (sum / f64::from(self.settings.spp)).as_vec3().to_array(),
             samples: self.settings.spp,
             first: first.expect("a pixel has at least one sample"),
-            misses: (shader.misses() - misses_before) as u32,
+            misses: (shader.misses() - misses_before) as u32 + known.map_or(0, |(_, misses)| misses),
+            group: NO_GROUP,
+            reason: Reason::Every,
+            error: 0.0,
         }
+    }
+
+    /// The camera ray and the random numbers of one sample of a pixel.
+    pub fn sample(&self, pixel: [u32; 2], i: u32) -> (Ray, Sampler) {
+        let [x, y] = pixel.map(f64::from);
+        let ray = self.camera.ray(DVec2::new(x, y) + subpixel(i), self.settings.size);
+        (ray, Sampler::new(self.settings.seed, pixel, i))
     }
 }
 
 /// Says how to come back to the pixel at which a thread panicked.
-struct PanicWitness([u32; 2]);
+pub(super) struct PanicWitness(pub [u32; 2]);
 
 impl Drop for PanicWitness {
     fn drop(&mut self) {

@@ -67,6 +67,23 @@ impl Camera {
         Ray::new(self.eye, (self.forward + sx * self.right + sy * self.up).normalize())
     }
 
+    /// Coordinates of a point of world space along right, up and forward, from the eye. The last is its depth.
+    pub fn view_from_world(&self, p: DVec3) -> DVec3 {
+        self.view_from_world_vector(p - self.eye)
+    }
+
+    /// As [`view_from_world`](Self::view_from_world) for a vector.
+    pub fn view_from_world_vector(&self, v: DVec3) -> DVec3 {
+        DVec3::new(v.dot(self.right), v.dot(self.up), v.dot(self.forward))
+    }
+
+    /// Where a point of view space with positive depth is seen: the inverse of [`ray`](Self::ray).
+    pub fn raster_from_view(&self, p: DVec3, [width, height]: [u32; 2]) -> DVec2 {
+        let (w, h) = (f64::from(width), f64::from(height));
+        let scale = 0.5 * h / (self.tan_half_fov * p.z);
+        DVec2::new(0.5 * w + scale * p.x, 0.5 * h - scale * p.y)
+    }
+
     /// How many pixels a length of 1 covers at distance 1, in the middle of a picture `height` pixels high.
     pub fn pixels_per_unit(&self, height: u32) -> f64 {
         f64::from(height) / (2.0 * self.tan_half_fov)
@@ -113,6 +130,15 @@ mod tests {
         let top = camera.ray(DVec2::new(400.0, 0.0), [800, 600]).direction;
         assert!(top.y > camera.forward().y);
         assert!((top.dot(camera.forward()).acos().to_degrees() - DEFAULT_FOV / 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_a_ray_passes_is_seen_where_the_ray_started() {
+        let camera = cube_camera();
+        let raster = DVec2::new(17.5, 301.25);
+        let ray = camera.ray(raster, [800, 600]);
+        let back = camera.raster_from_view(camera.view_from_world(ray.origin + 3.0 * ray.direction), [800, 600]);
+        assert!((back - raster).length() < 1e-9);
     }
 
     #[test]

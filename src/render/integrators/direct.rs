@@ -2,6 +2,7 @@
 
 use super::Shader;
 use super::interaction::Interaction;
+use super::smooth::LightState;
 use crate::math::Ray;
 use crate::render::rays::RayKind;
 use crate::render::tracer::Tracer;
@@ -17,18 +18,23 @@ impl<'a, T: Tracer> Shader<'a, T> {
     pub(super) fn direct_light(&mut self, x: &Interaction<'a>) -> Vec3 {
         let albedo = x.albedo();
         let appearance = self.appearance;
-        appearance.lights.iter().map(|light| self.light_from(light, x, albedo)).sum()
+        let lights = appearance.lights.iter().enumerate();
+        lights.map(|(i, light)| self.light_from(i, light, x, albedo)).sum()
     }
 
-    fn light_from(&mut self, light: &Light, x: &Interaction<'a>, albedo: Vec3) -> Vec3 {
+    fn light_from(&mut self, number: usize, light: &Light, x: &Interaction<'a>, albedo: Vec3) -> Vec3 {
         let Some(incident) = light.incident(x.point.position) else {
             return Vec3::ZERO;
         };
         let reflected = reflect(x, albedo, incident.to_light) * incident.irradiance;
         if reflected == Vec3::ZERO || !x.is_above(incident.to_light) {
+            self.trail.note_light(number, LightState::FacesAway);
             return Vec3::ZERO;
         }
-        reflected * self.visibility(x, &incident)
+        let visibility = self.visibility(x, &incident);
+        let is_blocked = visibility == Vec3::ZERO;
+        self.trail.note_light(number, if is_blocked { LightState::Blocked } else { LightState::Lit });
+        reflected * visibility
     }
 
     /// Share of a light that arrives, per channel.

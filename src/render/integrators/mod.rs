@@ -17,6 +17,7 @@ mod debug;
 mod direct;
 mod interaction;
 mod path;
+mod smooth;
 mod whitted;
 
 use super::film::FirstHit;
@@ -29,6 +30,8 @@ use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
 use glam::Vec3;
 use interaction::Interaction;
+use smooth::Trail;
+pub(super) use smooth::{LightMasks, Probe, Smooth, SmoothPoint};
 use whitted::PendingRay;
 
 /// What one camera ray brings back.
@@ -47,12 +50,13 @@ pub struct Shader<'a, T> {
     settings: &'a RenderSettings,
     rays: RayCounts,
     pending: Vec<PendingRay>,
+    trail: Trail,
 }
 
 impl<'a, T: Tracer> Shader<'a, T> {
     /// A shader that asks `tracer`.
     pub fn new(tracer: &'a mut T, appearance: &'a Appearance, settings: &'a RenderSettings) -> Self {
-        Self { tracer, appearance, settings, rays: RayCounts::default(), pending: Vec::new() }
+        Self { tracer, appearance, settings, rays: RayCounts::default(), pending: Vec::new(), trail: Trail::default() }
     }
 
     /// Rays traced so far.
@@ -67,6 +71,10 @@ impl<'a, T: Tracer> Shader<'a, T> {
 
     /// Traces a ray of `camera` and gathers light by the integrator of the settings.
     pub fn sample(&mut self, camera: &Camera, ray: Ray, sampler: Sampler) -> Sample {
+        self.trace(camera, ray, sampler).0
+    }
+
+    fn trace(&mut self, camera: &Camera, ray: Ray, sampler: Sampler) -> (Sample, Option<Interaction<'a>>) {
         let misses_before = self.misses();
         let hit = self.closest(RayKind::Primary, &ray);
         let radiance = match (&hit, self.settings.integrator) {
@@ -76,12 +84,14 @@ impl<'a, T: Tracer> Shader<'a, T> {
             (Some(x), IntegratorKind::Path) => self.path(*x, sampler),
             (Some(x), IntegratorKind::Debug(view)) => self.debug_color(view, x, camera, misses_before),
         };
-        Sample { radiance, first: hit.map_or(FirstHit::NONE, |x| x.first_hit(camera)) }
+        (Sample { radiance, first: hit.map_or(FirstHit::NONE, |x| x.first_hit(camera)) }, hit)
     }
 
     fn closest(&mut self, kind: RayKind, ray: &Ray) -> Option<Interaction<'a>> {
         self.rays.count(kind);
-        let hit = self.tracer.closest(ray)?;
+        let hit = self.tracer.closest(ray);
+        self.trail.note_hit(hit.as_ref());
+        let hit = hit?;
         let point = self.tracer.surface_point(ray, &hit);
         let material = &self.appearance.materials[hit.primitive.mesh.idx()];
         Some(Interaction::new(ray, hit, point, material))

@@ -26,7 +26,9 @@ impl<'a, T: Tracer> Shader<'a, T> {
     /// Ambient, diffuse and specular light at `first` and whatever is seen in it by reflection and refraction.
     pub(super) fn whitted(&mut self, first: &Interaction<'a>) -> Vec3 {
         debug_assert!(self.pending.is_empty());
+        self.trail.begin();
         let mut radiance = self.local_light(first);
+        self.trail.end_first(radiance);
         self.push_secondary(first, Vec3::ONE, 1);
         while let Some(PendingRay { kind, ray, weight, depth }) = self.pending.pop() {
             let Some(x) = self.closest(kind, &ray) else {

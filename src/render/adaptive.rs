@@ -1,0 +1,432 @@
+//! `--groups adaptive`: few rays, a bounded error.
+//!
+//! The picture is refined from cells of 16 pixels down to single ones. Nine **probes** of a cell are traced; it is
+//! interpolated only if they have seen one piece of smooth surface under the same lights, if no patch could have slipped
+//! between them ([`footprint`](super::footprint)), and if the four corner probes predict the five others within the
+//! tolerance. Otherwise it is split in four. A group in Ke's sense is a cell that holds; it may span several patches,
+//! wherever these are one smooth surface.
+//!
+//! What is interpolated is not colour but what varies smoothly (depth, normal, light from reflections), from the four
+//! nearest probes; direct light is then computed again for the pixel, so that highlights and patterns stay sharp. The four
+//! nearest are twice as close as those that the prediction was checked with, which for a smooth function makes the error
+//! a quarter of the one that was measured.
+//!
+//! # Invariants
+//! 1. Interpolation has no access to a tracer: an interpolated pixel touches no grid.
+//! 2. A tile depends on nothing but the scene, the camera and the settings; tiles lie at multiples of 64 pixels, whatever
+//!    the window. So neither threads nor a crop change a pixel.
+//! 3. A pixel that is not interpolated has, bit for bit, the colour that it has without groups.
+//!
+//! Ke, "Feature Adaptive Ray Tracing of Subdivision Surfaces", 2017, chapter 5.3 (groups); Akimoto et al., "Pixel-selected
+//! ray tracing", 1991 (refinement by prediction).
+
+use super::cells::{CELL_SIDES, Cell, CellPlace, TILE_SIDE, Tile, TracedProbe};
+use super::film::{Film, FirstHit, PixelRecord};
+use super::footprint::{Claim, Footprints};
+use super::integrators::{LightMasks, Probe, Sample, Shader, Smooth, SmoothPoint};
+use super::rays::RayCounts;
+use super::reason::{PixelCounts, Reason};
+use super::sampler::subpixel;
+use super::settings::{Appearance, RenderSettings, RunSettings};
+use super::tiles::PixelRect;
+use super::tracer::Tracer;
+use super::workers::{GroupSeconds, PixelTracer, Rendered, TileQueue, in_threads, render};
+use crate::ids::{MeshId, PatchId};
+use crate::image::display::display_value;
+use crate::scene::camera::Camera;
+use crate::scene::description::IntegratorKind;
+use crate::scene::world::World;
+use glam::{DVec2, Vec2, Vec3};
+use parking_lot::Mutex;
+use std::time::Instant;
+
+/// Probes whose normals are further from the others' mean than this, as a cosine, have a crease between them.
+const CREASE_COSINE: f32 = 0.8;
+
+/// The corners among a cell's nine probes, in the order (0,0), (1,0), (1,1), (0,1), and the others with their places.
+const CORNERS: [usize; 4] = [0, 2, 8, 6];
+const MIDDLES: [(usize, Vec2); 5] = [
+    (1, Vec2::new(0.5, 0.0)),
+    (3, Vec2::new(0.0, 0.5)),
+    (4, Vec2::new(0.5, 0.5)),
+    (5, Vec2::new(1.0, 0.5)),
+    (7, Vec2::new(0.5, 1.0)),
+];
+
+/// Renders a picture, tracing only the pixels that need it.
+pub fn render_adaptive<T: Tracer>(
+    world: &World,
+    camera: &Camera,
+    appearance: &Appearance,
+    settings: &RenderSettings,
+    run: &RunSettings<'_>,
+    make_tracer: impl Fn() -> T + Sync,
+) -> Rendered {
+    let watch = Instant::now();
+    let footprints = Footprints::new(world, camera, settings, run.threads).filter(|_| settings.tolerance > 0.0);
+    let Some(footprints) = footprints else {
+        return render(camera, appearance, settings, run, make_tracer);
+    };
+    let prepare = watch.elapsed().as_secs_f64();
+    let interpolation = Interpolation { camera, appearance, settings };
+    let job = Job { world, footprints: &footprints, interpolation };
+    let film = Mutex::new(Film::new(settings.window, &settings.aovs));
+    let queue = TileQueue::new(aligned(settings.window), TILE_SIDE, run);
+    let outcomes = in_threads(run.threads, || {
+        let mut tracer = make_tracer();
+        let shader = Shader::new(&mut tracer, appearance, settings);
+        Worker { job: &job, shader, tile: Tile::new(), outcome: Outcome::default() }.work(&queue, &film)
+    });
+    let mut total = Outcome::default();
+    outcomes.into_iter().for_each(|outcome| total.add(outcome));
+    total.seconds.prepare = prepare;
+    let film = film.into_inner();
+    let complete = film.n_done() == settings.window.n_pixels();
+    Rendered { film, rays: total.rays, pixels: total.pixels, seconds: total.seconds, complete }
+}
+
+/// The window with its borders moved outwards to those of tiles.
+fn aligned(window: PixelRect) -> PixelRect {
+    let down = |n: u32| n - n % TILE_SIDE;
+    let up = |n: u32| n.next_multiple_of(TILE_SIDE);
+    PixelRect { x0: down(window.x0), y0: down(window.y0), x1: up(window.x1), y1: up(window.y1) }
+}
+
+/// What all workers share.
+struct Job<'a> {
+    world: &'a World,
+    footprints: &'a Footprints,
+    interpolation: Interpolation<'a>,
+}
+
+/// What one worker has done.
+#[derive(Default)]
+struct Outcome {
+    rays: RayCounts,
+    pixels: PixelCounts,
+    seconds: GroupSeconds,
+}
+
+impl Outcome {
+    fn add(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.pixels += other.pixels;
+        self.seconds.trace += other.seconds.trace;
+        self.seconds.interpolate += other.seconds.interpolate;
+    }
+}
+
+struct Worker<'j, 's, T> {
+    job: &'j Job<'j>,
+    shader: Shader<'s, T>,
+    tile: Tile,
+    outcome: Outcome,
+}
+
+impl<T: Tracer> Worker<'_, '_, T> {
+    fn work(mut self, queue: &TileQueue<'_>, film: &Mutex<Film>) -> Outcome {
+        let window = self.job.interpolation.settings.window;
+        let mut records = Vec::with_capacity(TILE_SIDE.pow(2) as usize);
+        while let Some(tile) = queue.next_tile() {
+            let visible = intersection(tile, window);
+            self.render(tile, visible, &mut records);
+            records.iter().for_each(|record| self.outcome.pixels.add(record.reason, 1));
+            film.lock().store(visible, &records);
+            queue.report(tile.n_pixels());
+        }
+        self.outcome.rays = self.shader.rays();
+        self.outcome
+    }
+
+    /// Fills `records` with the pixels of `visible`, a part of `tile`.
+    fn render(&mut self, tile: PixelRect, visible: PixelRect, records: &mut Vec<PixelRecord>) {
+        let watch = Instant::now();
+        self.tile.reset([tile.x0, tile.y0]);
+        if self.job.interpolation.is_possible() {
+            (0..CELL_SIDES.len()).for_each(|level| self.refine(level));
+        } else {
+            self.split_all();
+        }
+        records.clear();
+        records.extend(visible.pixels().map(|pixel| self.traced(pixel)));
+        let traced = watch.elapsed().as_secs_f64();
+        for (record, pixel) in records.iter_mut().zip(visible.pixels()) {
+            if record.reason == Reason::Interpolated {
+                *record = self.job.interpolation.pixel(&self.tile, pixel);
+            }
+        }
+        self.outcome.seconds.trace += traced;
+        self.outcome.seconds.interpolate += watch.elapsed().as_secs_f64() - traced;
+    }
+
+    /// For integrators whose samples are random: what no patch reaches is known all the same.
+    fn split_all(&mut self) {
+        for level in 0..CELL_SIDES.len() {
+            for place in self.tile.cells_to_judge(level) {
+                let is_empty = self.job.footprints.is_empty(place.pixels());
+                self.tile.set_cell(&place, if is_empty { Cell::Empty } else { Cell::Split(Reason::Every) });
+            }
+        }
+    }
+
+    fn refine(&mut self, level: usize) {
+        for place in self.tile.cells_to_judge(level) {
+            let cell = if self.job.footprints.is_empty(place.pixels()) {
+                Cell::Empty
+            } else {
+                place.probe_pixels().into_iter().for_each(|pixel| self.trace_probe(pixel));
+                self.job.judge(&self.tile, &place)
+            };
+            self.tile.set_cell(&place, cell);
+        }
+        self.tile.split_beside_edges(level);
+    }
+
+    fn trace_probe(&mut self, pixel: [u32; 2]) {
+        if self.tile.probe(pixel).is_some() {
+            return;
+        }
+        let interpolation = &self.job.interpolation;
+        let before = self.shader.misses();
+        let probe = if self.job.footprints.is_empty(single(pixel)) {
+            let sample = Sample { radiance: interpolation.appearance.background, first: FirstHit::NONE };
+            Probe { sample, smooth: None }
+        } else {
+            let (ray, sampler) = interpolation.pixels().sample(pixel, 0);
+            self.shader.probe(interpolation.camera, ray, sampler)
+        };
+        self.tile.set_probe(pixel, TracedProbe { probe, misses: (self.shader.misses() - before) as u32 });
+    }
+
+    /// The pixel, unless it is to be interpolated: then a mere note of that.
+    fn traced(&mut self, pixel: [u32; 2]) -> PixelRecord {
+        let interpolation = &self.job.interpolation;
+        let background = PixelRecord::background(interpolation.appearance.background.to_array());
+        let (place, cell) = self.tile.find(pixel);
+        match cell {
+            Cell::Undivided | Cell::Empty => background,
+            Cell::Holds { .. } => interpolation.probed(&self.tile, &place, pixel).unwrap_or(background.interpolated()),
+            Cell::Split(_) if self.job.footprints.is_empty(single(pixel)) => background,
+            Cell::Split(reason) => {
+                let known = self.tile.probe(pixel).map(|p| (p.probe.sample, p.misses));
+                PixelRecord { reason, ..interpolation.pixels().trace_from(&mut self.shader, pixel, known) }
+            }
+        }
+    }
+}
+
+impl PixelRecord {
+    fn interpolated(self) -> Self {
+        Self { reason: Reason::Interpolated, ..self }
+    }
+}
+
+fn single([x, y]: [u32; 2]) -> PixelRect {
+    PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }
+}
+
+fn intersection(a: PixelRect, b: PixelRect) -> PixelRect {
+    PixelRect { x0: a.x0.max(b.x0), y0: a.y0.max(b.y0), x1: a.x1.min(b.x1), y1: a.y1.min(b.y1) }
+}
+
+impl Job<'_> {
+    /// Whether a cell whose probes are traced can be interpolated.
+    fn judge(&self, tile: &Tile, place: &CellPlace) -> Cell {
+        let pixels = place.probe_pixels();
+        let probes = pixels.map(|pixel| tile.probe(pixel).expect("all probes of a judged cell are traced").probe);
+        let Some(smooths) = all_smooth(&probes) else { return Cell::Split(Reason::Silhouette) };
+        if let Some(reason) = first_difference(&smooths) {
+            return Cell::Split(reason);
+        }
+        if !self.is_connected(place, &probes, &smooths) {
+            return Cell::Split(Reason::Hidden);
+        }
+        let error = self.interpolation.prediction_error(place, &probes, &smooths);
+        let holds = error <= self.interpolation.settings.tolerance;
+        if holds { Cell::Holds { error } } else { Cell::Split(Reason::Contradiction) }
+    }
+
+    fn is_connected(&self, place: &CellPlace, probes: &[Probe; 9], smooths: &[Smooth; 9]) -> bool {
+        let number =
+            |p: &Probe| self.footprints.numbers.number(MeshId(p.sample.first.mesh), PatchId(p.sample.first.patch));
+        let hits: [u32; 9] = std::array::from_fn(|k| number(&probes[k]));
+        let farthest = probes.iter().fold(0.0, |far: f32, p| far.max(p.sample.first.depth));
+        let claim = Claim { hits: &hits, outside: smooths[0].outside, farthest };
+        self.footprints.agree(self.world, place.pixels(), &claim)
+    }
+}
+
+fn all_smooth(probes: &[Probe; 9]) -> Option<[Smooth; 9]> {
+    let first = probes[0].smooth?;
+    let mut smooths = [first; 9];
+    for (smooth, probe) in smooths.iter_mut().zip(probes) {
+        *smooth = probe.smooth?;
+    }
+    Some(smooths)
+}
+
+/// What keeps probes from being of one smooth surface in the same light.
+fn first_difference(smooths: &[Smooth; 9]) -> Option<Reason> {
+    let first = &smooths[0];
+    if smooths.iter().any(|s| (s.mesh, s.outside) != (first.mesh, first.outside)) {
+        return Some(Reason::Silhouette);
+    }
+    let mean = smooths.iter().map(|s| s.normal).sum::<Vec3>().normalize_or_zero();
+    if smooths.iter().any(|s| s.normal.dot(mean) < CREASE_COSINE) {
+        return Some(Reason::Crease);
+    }
+    if all_lights(smooths).is_mixed() {
+        return Some(Reason::Shadow);
+    }
+    let same_way = smooths.iter().all(|s| s.signature == first.signature);
+    if same_way { None } else { Some(Reason::Reflection) }
+}
+
+fn all_lights(smooths: &[Smooth]) -> LightMasks {
+    smooths.iter().fold(LightMasks::default(), |all, s| all | s.lights)
+}
+
+/// Turns probes into pixels; knows no tracer.
+struct Interpolation<'a> {
+    camera: &'a Camera,
+    appearance: &'a Appearance,
+    settings: &'a RenderSettings,
+}
+
+impl<'a> Interpolation<'a> {
+    fn is_possible(&self) -> bool {
+        self.settings.integrator == IntegratorKind::Whitted && self.appearance.lights.len() <= LightMasks::CAPACITY
+    }
+
+    fn pixels(&self) -> PixelTracer<'a> {
+        PixelTracer { camera: self.camera, settings: self.settings }
+    }
+
+    /// The largest difference, in display units, between a cell's probes and what its corners predict of them.
+    fn prediction_error(&self, place: &CellPlace, probes: &[Probe; 9], smooths: &[Smooth; 9]) -> f32 {
+        let corners = Corners::new(CORNERS.map(|k| &probes[k]), CORNERS.map(|k| &smooths[k]));
+        let side = f64::from(place.side);
+        let errors = MIDDLES.map(|(k, uv)| {
+            let raster = DVec2::new(f64::from(place.x), f64::from(place.y)) + side * uv.as_dvec2() + 0.5;
+            display_difference(self.radiance(&corners, uv, raster), probes[k].sample.radiance)
+        });
+        errors.into_iter().fold(0.0, f32::max)
+    }
+
+    /// A pixel of a cell that holds, if a probe was traced for it.
+    fn probed(&self, tile: &Tile, place: &CellPlace, pixel: [u32; 2]) -> Option<PixelRecord> {
+        let TracedProbe { probe, misses } = tile.probe(pixel)?;
+        let mesh = probe.smooth?.mesh;
+        if self.settings.spp > 1 && self.appearance.is_patterned(mesh) {
+            return None;
+        }
+        let is_corner = pixel[0] == place.x && pixel[1] == place.y;
+        Some(PixelRecord {
+            color: probe.sample.radiance.to_array(),
+            samples: 1,
+            first: probe.sample.first,
+            misses: *misses,
+            group: self.group(place),
+            reason: if is_corner { Reason::Corner } else { Reason::Probe },
+            error: 0.0,
+        })
+    }
+
+    /// A number for a cell: where it begins, in units of the smallest.
+    fn group(&self, place: &CellPlace) -> u32 {
+        let unit = CELL_SIDES[CELL_SIDES.len() - 1];
+        place.y / unit * self.settings.size[0].div_ceil(unit) + place.x / unit
+    }
+
+    /// A pixel of a cell that holds, from the four nearest probes.
+    fn pixel(&self, tile: &Tile, pixel: [u32; 2]) -> PixelRecord {
+        let (place, cell) = tile.find(pixel);
+        let half = place.side / 2;
+        let [x, y] = pixel.map(|n| n - n % half);
+        let nearest = [[x, y], [x + half, y], [x + half, y + half], [x, y + half]];
+        let probes = nearest.map(|p| &tile.probe(p).expect("a cell that holds has all its probes").probe);
+        let smooths = probes.map(|p| p.smooth.as_ref().expect("a cell that holds shows surface everywhere"));
+        let corners = Corners::new(probes, smooths);
+        let place_in =
+            |raster: DVec2| ((raster - 0.5 - DVec2::new(f64::from(x), f64::from(y))) / f64::from(half)).as_vec2();
+        let n = if self.appearance.is_patterned(smooths[0].mesh) { self.settings.spp } else { 1 };
+        let rasters = (0..n).map(|i| DVec2::from(pixel.map(f64::from)) + subpixel(i));
+        let sum: Vec3 = rasters.map(|raster| self.radiance(&corners, place_in(raster), raster)).sum();
+        let error = if let Cell::Holds { error } = cell { error } else { 0.0 };
+        PixelRecord {
+            color: (sum / n as f32).to_array(),
+            samples: 0,
+            first: corners.first_hit(place_in(DVec2::from(pixel.map(f64::from)) + 0.5)),
+            misses: 0,
+            group: self.group(&place),
+            reason: Reason::Interpolated,
+            error,
+        }
+    }
+
+    /// Radiance at (u, v) between four probes, seen at `raster`.
+    fn radiance(&self, corners: &Corners<'_>, uv: Vec2, raster: DVec2) -> Vec3 {
+        let weights = bilinear_weights(uv);
+        if !self.appearance.can_reshade() {
+            return corners.mix(weights, |probe, _| probe.sample.radiance);
+        }
+        let direction = self.camera.ray(raster, self.settings.size).direction;
+        let depth = 1.0 / f64::from(corners.inverse_depth(weights));
+        let point = SmoothPoint {
+            mesh: corners.smooths[0].mesh,
+            position: self.camera.eye() + depth / direction.dot(self.camera.forward()) * direction,
+            normal: corners.normal(weights),
+            to_eye: -direction.as_vec3(),
+            blocked: corners.blocked,
+        };
+        self.appearance.local_radiance(&point) + corners.mix(weights, |_, smooth| smooth.secondary)
+    }
+}
+
+fn display_difference(a: Vec3, b: Vec3) -> f32 {
+    let difference = |i: usize| (display_value(a[i]) - display_value(b[i])).abs();
+    difference(0).max(difference(1)).max(difference(2))
+}
+
+fn bilinear_weights(uv: Vec2) -> [f32; 4] {
+    let (u, v) = (uv.x, uv.y);
+    [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v]
+}
+
+/// Four probes that span a square, in the order (0,0), (1,0), (1,1), (0,1).
+struct Corners<'p> {
+    probes: [&'p Probe; 4],
+    smooths: [&'p Smooth; 4],
+    blocked: u64,
+}
+
+impl<'p> Corners<'p> {
+    fn new(probes: [&'p Probe; 4], smooths: [&'p Smooth; 4]) -> Self {
+        let blocked = smooths.iter().fold(0, |all, s| all | s.lights.blocked);
+        Self { probes, smooths, blocked }
+    }
+
+    fn mix(&self, weights: [f32; 4], value: impl Fn(&Probe, &Smooth) -> Vec3) -> Vec3 {
+        (0..4).map(|k| weights[k] * value(self.probes[k], self.smooths[k])).sum()
+    }
+
+    fn inverse_depth(&self, weights: [f32; 4]) -> f32 {
+        (0..4).map(|k| weights[k] * self.smooths[k].inverse_depth).sum()
+    }
+
+    fn normal(&self, weights: [f32; 4]) -> Vec3 {
+        self.mix(weights, |_, smooth| smooth.normal).normalize_or(self.smooths[0].normal)
+    }
+
+    /// Depth and normal between the probes; patch and parameters are those of the nearest probe.
+    fn first_hit(&self, uv: Vec2) -> FirstHit {
+        let weights = bilinear_weights(uv);
+        let nearest = (0..4).max_by(|&a, &b| weights[a].total_cmp(&weights[b])).expect("there are four");
+        let outwards = if self.smooths[0].outside { 1.0 } else { -1.0 };
+        FirstHit {
+            depth: 1.0 / self.inverse_depth(weights),
+            normal: (outwards * self.normal(weights)).to_array(),
+            ..self.probes[nearest].sample.first
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! The cells that a tile is refined into, and the probes at their corners and middles.
+//!
+//! A tile of 64 x 64 pixels has cells of 16, 8 and 4 pixels a side, aligned to the whole picture. A cell knows nine probes:
+//! its corners, the middles of its sides and its centre, at pixels' centres. Corners and middles on the right and at the
+//! bottom belong to the next cell's pixels, or the next tile's.
+
+use super::integrators::Probe;
+use super::reason::Reason;
+use super::tiles::PixelRect;
+
+/// Side of a tile in pixels. Smaller tiles share fewer probes, larger ones keep threads waiting at the end.
+pub(super) const TILE_SIDE: u32 = 64;
+
+/// Sides of the cells of each level.
+pub(super) const CELL_SIDES: [u32; 3] = [16, 8, 4];
+
+/// Probes along a side of a tile.
+const PROBES: u32 = TILE_SIDE + 1;
+
+/// What has become of a cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Cell {
+    /// Part of a larger cell that holds.
+    Undivided,
+    /// No patch reaches it.
+    Empty,
+    /// Its interpolation holds: probes differ from it by at most `error` display units.
+    Holds { error: f32 },
+    /// It does not, for this reason.
+    Split(Reason),
+}
+
+/// A traced pixel centre.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TracedProbe {
+    pub probe: Probe,
+    /// Blocks built for it.
+    pub misses: u32,
+}
+
+/// A tile at work.
+pub(super) struct Tile {
+    origin: [u32; 2],
+    probes: Vec<Option<TracedProbe>>,
+    cells: [Vec<Cell>; CELL_SIDES.len()],
+}
+
+/// A cell's place: level, and origin and side in pixels of the whole picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct CellPlace {
+    pub level: usize,
+    pub x: u32,
+    pub y: u32,
+    pub side: u32,
+}
+
+impl CellPlace {
+    pub fn pixels(&self) -> PixelRect {
+        PixelRect { x0: self.x, y0: self.y, x1: self.x + self.side, y1: self.y + self.side }
+    }
+
+    /// Pixels of its nine probes, row by row.
+    pub fn probe_pixels(&self) -> [[u32; 2]; 9] {
+        let half = self.side / 2;
+        std::array::from_fn(|k| [self.x + half * (k as u32 % 3), self.y + half * (k as u32 / 3)])
+    }
+}
+
+impl Tile {
+    pub fn new() -> Self {
+        let cells = CELL_SIDES.map(|side| vec![Cell::Undivided; (TILE_SIDE / side).pow(2) as usize]);
+        Self { origin: [0; 2], probes: vec![None; PROBES.pow(2) as usize], cells }
+    }
+
+    /// Begins another tile.
+    pub fn reset(&mut self, origin: [u32; 2]) {
+        self.origin = origin;
+        self.probes.fill(None);
+        self.cells.iter_mut().for_each(|cells| cells.fill(Cell::Undivided));
+    }
+
+    /// The probe at a pixel of the tile or right beside or below it.
+    pub fn probe(&self, pixel: [u32; 2]) -> Option<&TracedProbe> {
+        self.probes[self.probe_idx(pixel)].as_ref()
+    }
+
+    pub fn set_probe(&mut self, pixel: [u32; 2], probe: TracedProbe) {
+        let idx = self.probe_idx(pixel);
+        self.probes[idx] = Some(probe);
+    }
+
+    fn probe_idx(&self, [x, y]: [u32; 2]) -> usize {
+        ((y - self.origin[1]) * PROBES + x - self.origin[0]) as usize
+    }
+
+    /// The cell of a level that has the pixel.
+    pub fn place(&self, level: usize, [x, y]: [u32; 2]) -> CellPlace {
+        let side = CELL_SIDES[level];
+        CellPlace { level, x: x - x % side, y: y - y % side, side }
+    }
+
+    /// Cells of a level whose larger cell was split.
+    pub fn cells_to_judge(&self, level: usize) -> Vec<CellPlace> {
+        let side = CELL_SIDES[level];
+        let n = TILE_SIDE / side;
+        let places =
+            (0..n * n).map(|k| self.place(level, [self.origin[0] + k % n * side, self.origin[1] + k / n * side]));
+        places
+            .filter(|p| level == 0 || matches!(self.cell(&self.place(level - 1, [p.x, p.y])), Cell::Split(_)))
+            .collect()
+    }
+
+    pub fn cell(&self, place: &CellPlace) -> Cell {
+        self.cells[place.level][self.cell_idx(place)]
+    }
+
+    pub fn set_cell(&mut self, place: &CellPlace, cell: Cell) {
+        let idx = self.cell_idx(place);
+        self.cells[place.level][idx] = cell;
+    }
+
+    fn cell_idx(&self, place: &CellPlace) -> usize {
+        let [x, y] = [place.x - self.origin[0], place.y - self.origin[1]].map(|n| n / place.side);
+        (y * (TILE_SIDE / place.side) + x) as usize
+    }
+
+    /// Splits the cells of a level that hold beside one with an edge in it: the edge may go on between their probes.
+    pub fn split_beside_edges(&mut self, level: usize) {
+        let n = (TILE_SIDE / CELL_SIDES[level]) as usize;
+        let has_edge: Vec<bool> =
+            self.cells[level].iter().map(|cell| matches!(cell, Cell::Split(reason) if reason.is_edge())).collect();
+        for (k, cell) in self.cells[level].iter_mut().enumerate() {
+            let (x, y) = (k % n, k / n);
+            let rows = y.saturating_sub(1)..(y + 2).min(n);
+            let beside = |row: usize| has_edge[row * n + x.saturating_sub(1)..row * n + (x + 2).min(n)].contains(&true);
+            if matches!(cell, Cell::Holds { .. }) && rows.clone().any(beside) {
+                *cell = Cell::Split(Reason::Neighbour);
+            }
+        }
+    }
+
+    /// The smallest cell that has the pixel, and what became of it.
+    pub fn find(&self, pixel: [u32; 2]) -> (CellPlace, Cell) {
+        let mut found = (self.place(0, pixel), self.cell(&self.place(0, pixel)));
+        for level in 1..CELL_SIDES.len() {
+            let place = self.place(level, pixel);
+            match self.cell(&place) {
+                Cell::Undivided => return found,
+                cell => found = (place, cell),
+            }
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_split_the_cells_beside_them() {
+        let mut tile = Tile::new();
+        tile.reset([64, 128]);
+        for place in tile.cells_to_judge(0) {
+            tile.set_cell(&place, Cell::Holds { error: 0.0 });
+        }
+        let edge = tile.place(0, [64, 128]);
+        tile.set_cell(&edge, Cell::Split(Reason::Shadow));
+        tile.split_beside_edges(0);
+        let cells: Vec<_> = [[64, 128], [80, 144], [96, 128]].map(|p| tile.cell(&tile.place(0, p))).into();
+        assert_eq!(cells, [Cell::Split(Reason::Shadow), Cell::Split(Reason::Neighbour), Cell::Holds { error: 0.0 }]);
+    }
+
+    #[test]
+    fn the_smallest_cell_of_a_pixel_is_found() {
+        let mut tile = Tile::new();
+        tile.reset([0, 64]);
+        let large = tile.place(0, [20, 70]);
+        tile.set_cell(&large, Cell::Split(Reason::Crease));
+        assert_eq!(tile.cells_to_judge(1).len(), 4);
+        let small = tile.place(1, [20, 70]);
+        tile.set_cell(&small, Cell::Empty);
+        assert_eq!(tile.find([20, 70]), (CellPlace { level: 1, x: 16, y: 64, side: 8 }, Cell::Empty));
+        assert_eq!(tile.find([40, 70]), (tile.place(0, [40, 70]), Cell::Undivided));
+    }
+}
