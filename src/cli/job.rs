@@ -21,6 +21,7 @@ use crate::scene::description::SceneDescription;
 use crate::scene::intersect::Intersector;
 use crate::scene::world::{GridCache, World, WorldMesh};
 use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
 /// A scene whose meshes have not been read.
 pub struct RenderScene<'a> {
@@ -131,22 +132,44 @@ impl Prepared<'_> {
 
     /// Renders, with a progress bar where one can be seen.
     pub fn render(&self, cache: &GridCache, threads: usize, quiet: bool, cancel: &AtomicBool) -> Result<Rendered> {
-        let materials = self.scene.meshes.iter().map(|m| m.material.clone()).collect();
-        let appearance = Appearance::new(materials, self.scene.lights.clone(), self.scene.background);
+        self.render_as(self.settings, cache, threads, quiet, cancel)
+    }
+
+    /// As [`render`](Self::render) with other settings, but the size that the scene was prepared for.
+    pub fn render_as(
+        &self,
+        settings: &RenderSettings,
+        cache: &GridCache,
+        threads: usize,
+        quiet: bool,
+        cancel: &AtomicBool,
+    ) -> Result<Rendered> {
+        let appearance = self.appearance();
         let progress = Progress::new("pixels", quiet);
         let report = |p: settings::Progress| progress.set(p.done, p.total);
         let run = RunSettings { progress: &report, ..RunSettings::quiet(threads, cancel) };
         let make_tracer = || Intersector::new(&self.world, cache);
-        let (camera, settings) = (&self.camera, self.settings);
+        let camera = &self.camera;
         let rendered = match settings.groups {
             Groups::Off => render(camera, &appearance, settings, &run, make_tracer),
             Groups::Adaptive => render_adaptive(&self.world, camera, &appearance, settings, &run, make_tracer),
             Groups::Thesis => {
+                let watch = Instant::now();
                 let items = ItemBuffer::new(&self.world, camera, settings, 1, threads)?;
-                render_thesis(camera, &appearance, settings, &run, &items, Interpolation::Bilinear, make_tracer)
+                let rasterise = watch.elapsed().as_secs_f64();
+                let how = Interpolation::Bilinear;
+                let mut rendered = render_thesis(camera, &appearance, settings, &run, &items, how, make_tracer);
+                rendered.seconds.prepare += rasterise;
+                rendered
             }
         };
         progress.finish();
         Ok(rendered)
+    }
+
+    /// Materials and lights.
+    pub fn appearance(&self) -> Appearance {
+        let materials = self.scene.meshes.iter().map(|m| m.material.clone()).collect();
+        Appearance::new(materials, self.scene.lights.clone(), self.scene.background)
     }
 }

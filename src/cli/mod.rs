@@ -24,6 +24,8 @@ pub mod sample;
 pub mod stdout;
 pub mod tessellate;
 pub mod tune;
+mod thesis_tables;
+pub mod tradeoff;
 pub mod values;
 
 use crate::error::{Error, Result};
@@ -54,6 +56,7 @@ enum Command {
     Tune(tune::TuneArgs),
     Info(info::InfoArgs),
     Check(check::CheckArgs),
+    Tradeoff(tradeoff::TradeoffArgs),
     Compare(compare::CompareArgs),
     Generate(generate::GenerateArgs),
 }
@@ -69,6 +72,7 @@ impl Cli {
             Command::Tune(args) => args.run(),
             Command::Info(args) => args.run(),
             Command::Check(args) => args.run(),
+            Command::Tradeoff(args) => args.run(),
             Command::Compare(args) => args.run(),
             Command::Generate(args) => args.run(),
         }

@@ -12,7 +12,9 @@ use crate::io::process::{Stopwatch, peak_resident_bytes};
 use crate::io::write::write_whole;
 use crate::render::workers::Rendered;
 use crate::render::{Aov, RenderSettings};
-use crate::report::{CacheReport, GeometryReport, MemoryReport, PictureReport, RayReport, RenderStatistics};
+use crate::report::{
+    CacheReport, GeometryReport, GroupReport, MemoryReport, PictureReport, RayReport, RenderStatistics,
+};
 use crate::scene::description::SceneDescription;
 use crate::scene::world::GridCache;
 use clap::Args;
@@ -199,6 +201,7 @@ impl RenderJob {
                 spp: self.settings.spp,
                 integrator: self.settings.integrator.to_string(),
             },
+            groups: GroupReport::new(&self.settings, rendered),
             rays: RayReport { counts: rendered.rays, total: rendered.rays.total() },
             geometry: GeometryReport {
                 meshes: prepared.world.meshes().len(),

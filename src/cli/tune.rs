@@ -72,7 +72,7 @@ impl TuneArgs {
         let mut cache = prepared.cache(size, threads)?;
         cache.record(TraceLog::new(self.accesses));
         let watch = Stopwatch::start();
-        let rendered = prepared.render(&cache, threads, quiet, &cancel);
+        let rendered = prepared.render(&cache, threads, quiet, &cancel)?;
         let seconds = watch.seconds().0;
         if !rendered.complete {
             return Err(Error::new(ErrorKind::Interrupted, "interrupted: nothing is known of the rest of the picture"));

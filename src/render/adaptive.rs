@@ -20,7 +20,7 @@
 //! Ke, "Feature Adaptive Ray Tracing of Subdivision Surfaces", 2017, chapter 5.3 (groups); Akimoto et al., "Pixel-selected
 //! ray tracing", 1991 (refinement by prediction).
 
-use super::cells::{CELL_SIDES, Cell, CellPlace, TILE_SIDE, Tile, TracedProbe};
+use super::cells::{CELL_SIDES, Cell, CellPlace, QUAD_LEVEL, TILE_SIDE, Tile, TracedProbe};
 use super::film::{Film, FirstHit, PixelRecord};
 use super::footprint::{Claim, Footprints};
 use super::integrators::{LightMasks, Probe, Sample, Shader, Smooth, SmoothPoint};
@@ -143,12 +143,21 @@ impl<T: Tracer> Worker<'_, '_, T> {
         let watch = Instant::now();
         self.tile.reset([tile.x0, tile.y0]);
         if self.job.interpolation.is_possible() {
-            (0..CELL_SIDES.len()).for_each(|level| self.refine(level));
+            (0..QUAD_LEVEL).for_each(|level| self.refine(level));
+            if self.job.interpolation.settings.spp == 1 {
+                self.judge_quads();
+            }
         } else {
             self.split_all();
         }
         records.clear();
-        records.extend(visible.pixels().map(|pixel| self.traced(pixel)));
+        records.resize(visible.n_pixels(), PixelRecord::background([0.0; 3]));
+        for k in 0..TILE_SIDE.pow(2) {
+            let pixel = [tile.x0 + even_bits(k), tile.y0 + even_bits(k >> 1)];
+            if let Some(idx) = visible.idx(pixel) {
+                records[idx] = self.traced(pixel);
+            }
+        }
         let traced = watch.elapsed().as_secs_f64();
         for (record, pixel) in records.iter_mut().zip(visible.pixels()) {
             if record.reason == Reason::Interpolated {
@@ -161,10 +170,10 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// For integrators whose samples are random: what no patch reaches is known all the same.
     fn split_all(&mut self) {
-        for level in 0..CELL_SIDES.len() {
+        for level in 0..QUAD_LEVEL {
             for place in self.tile.cells_to_judge(level) {
                 let is_empty = self.job.footprints.is_empty(place.pixels());
-                self.tile.set_cell(&place, if is_empty { Cell::Empty } else { Cell::Split(Reason::Every) });
+                self.tile.set_cell(&place, if is_empty { Cell::Empty } else { Cell::split(Reason::Every) });
             }
         }
     }
@@ -179,7 +188,20 @@ impl<T: Tracer> Worker<'_, '_, T> {
             };
             self.tile.set_cell(&place, cell);
         }
-        self.tile.split_beside_edges(level);
+        // Where pixels are antialiased, an edge may reach into a pixel beside the cell that shows it.
+        if level + 1 < QUAD_LEVEL || self.job.interpolation.settings.spp > 1 {
+            self.tile.split_beside_edges(level);
+        }
+    }
+
+    fn judge_quads(&mut self) {
+        for place in self.tile.cells_to_judge(QUAD_LEVEL) {
+            let parent = self.tile.cell(&self.tile.place(QUAD_LEVEL - 1, [place.x, place.y]));
+            let Cell::Split { reason, error } = parent else { continue };
+            let is_empty = self.job.footprints.is_empty(place.pixels());
+            let cell = if is_empty { Cell::Empty } else { self.job.judge_quad(&self.tile, &place, reason, error) };
+            self.tile.set_cell(&place, cell);
+        }
     }
 
     fn trace_probe(&mut self, pixel: [u32; 2]) {
@@ -206,13 +228,18 @@ impl<T: Tracer> Worker<'_, '_, T> {
         match cell {
             Cell::Undivided | Cell::Empty => background,
             Cell::Holds { .. } => interpolation.probed(&self.tile, &place, pixel).unwrap_or(background.interpolated()),
-            Cell::Split(_) if self.job.footprints.is_empty(single(pixel)) => background,
-            Cell::Split(reason) => {
+            Cell::Split { .. } if self.job.footprints.is_empty(single(pixel)) => background,
+            Cell::Split { reason, .. } => {
                 let known = self.tile.probe(pixel).map(|p| (p.probe.sample, p.misses));
                 PixelRecord { reason, ..interpolation.pixels().trace_from(&mut self.shader, pixel, known) }
             }
         }
     }
+}
+
+/// Every second bit, from bit 0: half of a place on the Z curve, along which neighbours follow one another.
+fn even_bits(k: u32) -> u32 {
+    (0..16).fold(0, |bits, i| bits | (k >> (2 * i) & 1) << i)
 }
 
 impl PixelRecord {
@@ -234,31 +261,50 @@ impl Job<'_> {
     fn judge(&self, tile: &Tile, place: &CellPlace) -> Cell {
         let pixels = place.probe_pixels();
         let probes = pixels.map(|pixel| tile.probe(pixel).expect("all probes of a judged cell are traced").probe);
-        let Some(smooths) = all_smooth(&probes) else { return Cell::Split(Reason::Silhouette) };
+        let Some(smooths) = all_smooth(&probes) else { return Cell::split(Reason::Silhouette) };
         if let Some(reason) = first_difference(&smooths) {
-            return Cell::Split(reason);
+            return Cell::split(reason);
         }
         if !self.is_connected(place, &probes, &smooths) {
-            return Cell::Split(Reason::Hidden);
+            return Cell::split(Reason::Hidden);
         }
         let error = self.interpolation.prediction_error(place, &probes, &smooths);
         let holds = error <= self.interpolation.settings.tolerance;
-        if holds { Cell::Holds { error } } else { Cell::Split(Reason::Contradiction) }
+        if holds { Cell::Holds { error } } else { Cell::Split { reason: Reason::Contradiction, error } }
     }
 
-    fn is_connected(&self, place: &CellPlace, probes: &[Probe; 9], smooths: &[Smooth; 9]) -> bool {
+    /// Whether a cell of 2 pixels, part of one that was split, can be interpolated between its corners. There is no probe to
+    /// contradict it: where its parent was contradicted, a quarter of the parent's error is taken for its own.
+    fn judge_quad(&self, tile: &Tile, place: &CellPlace, parent: Reason, parent_error: f32) -> Cell {
+        let pixels = place.corner_pixels();
+        let probes = pixels.map(|pixel| tile.probe(pixel).expect("all probes of the parent are traced").probe);
+        let Some(smooths) = all_smooth(&probes) else { return Cell::split(Reason::Silhouette) };
+        let error = 0.25 * parent_error;
+        // Footprints tell of silhouettes that no corner shows, but not of thin shadows, reflections and folds.
+        let is_thin = matches!(parent, Reason::Shadow | Reason::Reflection | Reason::Crease);
+        if is_thin || error > self.interpolation.settings.tolerance {
+            return Cell::Split { reason: parent, error: parent_error };
+        }
+        match first_difference(&smooths) {
+            Some(reason) => Cell::split(reason),
+            None if !self.is_connected(place, &probes, &smooths) => Cell::split(Reason::Hidden),
+            None => Cell::Holds { error },
+        }
+    }
+
+    fn is_connected<const N: usize>(&self, place: &CellPlace, probes: &[Probe; N], smooths: &[Smooth; N]) -> bool {
         let number =
             |p: &Probe| self.footprints.numbers.number(MeshId(p.sample.first.mesh), PatchId(p.sample.first.patch));
-        let hits: [u32; 9] = std::array::from_fn(|k| number(&probes[k]));
+        let hits: [u32; N] = std::array::from_fn(|k| number(&probes[k]));
         let farthest = probes.iter().fold(0.0, |far: f32, p| far.max(p.sample.first.depth));
         let claim = Claim { hits: &hits, outside: smooths[0].outside, farthest };
         self.footprints.agree(self.world, place.pixels(), &claim)
     }
 }
 
-fn all_smooth(probes: &[Probe; 9]) -> Option<[Smooth; 9]> {
+fn all_smooth<const N: usize>(probes: &[Probe; N]) -> Option<[Smooth; N]> {
     let first = probes[0].smooth?;
-    let mut smooths = [first; 9];
+    let mut smooths = [first; N];
     for (smooth, probe) in smooths.iter_mut().zip(probes) {
         *smooth = probe.smooth?;
     }
@@ -266,7 +312,7 @@ fn all_smooth(probes: &[Probe; 9]) -> Option<[Smooth; 9]> {
 }
 
 /// What keeps probes from being of one smooth surface in the same light.
-fn first_difference(smooths: &[Smooth; 9]) -> Option<Reason> {
+fn first_difference(smooths: &[Smooth]) -> Option<Reason> {
     let first = &smooths[0];
     if smooths.iter().any(|s| (s.mesh, s.outside) != (first.mesh, first.outside)) {
         return Some(Reason::Silhouette);
@@ -341,7 +387,7 @@ impl<'a> Interpolation<'a> {
     /// A pixel of a cell that holds, from the four nearest probes.
     fn pixel(&self, tile: &Tile, pixel: [u32; 2]) -> PixelRecord {
         let (place, cell) = tile.find(pixel);
-        let half = place.side / 2;
+        let half = place.probe_distance();
         let [x, y] = pixel.map(|n| n - n % half);
         let nearest = [[x, y], [x + half, y], [x + half, y + half], [x, y + half]];
         let probes = nearest.map(|p| &tile.probe(p).expect("a cell that holds has all its probes").probe);

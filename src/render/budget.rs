@@ -9,8 +9,10 @@
 //!                                                                 because the cache is gone by then
 //! ```
 
+use super::cells::Tile;
 use super::film::Film;
-use super::settings::RenderSettings;
+use super::footprint::Footprints;
+use super::settings::{Groups, RenderSettings};
 use crate::cache::SegmentCache;
 use crate::error::{Error, ErrorKind, Result};
 use std::fmt;
@@ -33,6 +35,8 @@ pub struct RenderNeeds {
     pub film: u64,
     /// All workers.
     pub workers: u64,
+    /// What groups of pixels need to know before the first ray.
+    pub groups: u64,
     /// What writing the picture takes once the cache is gone.
     pub writing: u64,
 }
@@ -43,12 +47,13 @@ impl RenderNeeds {
     pub fn new(resident: u64, tables: usize, settings: &RenderSettings, threads: usize) -> Self {
         let film = Film::n_bytes(settings.window, &settings.aovs) as u64;
         let workers = (WORKER_BYTES * threads) as u64;
+        let groups = group_bytes(settings, threads) as u64;
         // Channel by channel the film is copied once; encoders hold a copy of some lines in another form.
-        Self { resident, tables: tables as u64, film, workers, writing: 2 * film }
+        Self { resident, tables: tables as u64, film, workers, groups, writing: 2 * film }
     }
 
     fn without_cache(&self) -> u64 {
-        self.resident + self.tables + self.film + self.workers + ODDS_AND_ENDS
+        self.resident + self.tables + self.film + self.workers + self.groups + ODDS_AND_ENDS
     }
 
     /// The smallest budget that will do.
@@ -71,7 +76,17 @@ impl RenderNeeds {
 impl fmt::Display for RenderNeeds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [resident, tables, film, workers] = [self.resident, self.tables, self.film, self.workers].map(mebibytes);
-        write!(f, "program and meshes {resident}M, slots {tables}M, film {film}M, workers {workers}M")
+        write!(f, "program and meshes {resident}M, slots {tables}M, film {film}M, workers {workers}M")?;
+        if self.groups > 0 { write!(f, ", groups {}M", mebibytes(self.groups)) } else { Ok(()) }
+    }
+}
+
+/// Bytes that the settings' way of grouping takes at most.
+fn group_bytes(settings: &RenderSettings, threads: usize) -> usize {
+    match settings.groups {
+        Groups::Off => 0,
+        Groups::Thesis => super::thesis::max_bytes(settings),
+        Groups::Adaptive => Footprints::max_bytes(settings) + threads * Tile::BYTES,
     }
 }
 

@@ -36,8 +36,8 @@ const NEAR: f64 = 1e-7;
 /// Boxes on the picture are this much larger, in pixels, than computed.
 const ROUNDING: f64 = 1e-3;
 
-/// Quarters of irregular patches that boxes look into.
-const BOX_DEPTH: u32 = 3;
+/// Quarters of irregular patches that boxes look into: each more makes boxes tighter, and finding them slower.
+const BOX_DEPTH: u32 = 1;
 
 /// A part counts as seen from one side if its normals are so much further from edge-on, as a cosine, than they vary.
 const SIDE_MARGIN: f64 = 0.02;
@@ -83,9 +83,9 @@ pub(super) struct Claim<'a> {
 }
 
 impl Footprints {
-    /// Bytes that the footprints of a picture take at most; scenes with more are not worth grouping.
+    /// Bytes that the footprints of a picture take at most while they are sorted; scenes with more are not worth grouping.
     pub fn max_bytes(settings: &RenderSettings) -> usize {
-        max_footprints(settings) * size_of::<Footprint>()
+        max_footprints(settings) * (size_of::<Footprint>() + 2 * size_of::<(u32, Footprint)>())
     }
 
     /// Projects all patches. `None` if there are too many for groups to pay: patches of a few pixels, or ids beyond 32 bits.
@@ -167,7 +167,7 @@ impl Footprints {
 }
 
 fn max_footprints(settings: &RenderSettings) -> usize {
-    settings.size.iter().map(|&n| n as usize).product::<usize>() / 2 + 4096
+    settings.size.iter().map(|&n| n as usize).product::<usize>() / 4 + 4096
 }
 
 fn sorted_by_block<'a>(

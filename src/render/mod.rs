@@ -29,6 +29,8 @@ pub mod budget;
 mod cells;
 pub mod film;
 pub mod footprint;
+#[cfg(test)]
+mod group_tests;
 pub mod groups;
 pub mod integrators;
 pub mod interpolate;

@@ -38,6 +38,12 @@ pub enum Interpolation {
     MeanValue,
 }
 
+/// Bytes that groups and their corners take at most: every pixel may be a group of its own.
+pub(super) fn max_bytes(settings: &RenderSettings) -> usize {
+    let per_pixel = 8 + size_of::<u32>() + 2 * size_of::<[u32; 4]>() + 2 * size_of::<PixelRecord>();
+    settings.size.iter().map(|&n| n as usize).product::<usize>() * per_pixel
+}
+
 /// Renders by groups of equal items.
 pub fn render_thesis<T: Tracer>(
     camera: &Camera,

@@ -10,9 +10,13 @@ mod quantity;
 pub mod statistics;
 pub mod summary;
 pub mod tuning;
+pub mod pareto;
+pub mod tradeoff;
 
 pub use inventory::{CacheAdvice, Inventory};
 pub use statistics::{
-    CacheReport, GeometryReport, MemoryReport, PhaseSeconds, PictureReport, RayReport, RenderStatistics, Seconds,
+    CacheReport, GeometryReport, GroupReport, MemoryReport, PhaseSeconds, PictureReport, RayReport, RenderStatistics,
+    Seconds,
 };
 pub use tuning::{CurvePoint, RecordedRender, Tuning};
+pub use tradeoff::{Tradeoff, TradeoffRun};

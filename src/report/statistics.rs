@@ -1,7 +1,7 @@
 //! The statistics of a render as data.
 
 use crate::cache::CacheStatistics;
-use crate::render::RayCounts;
+use crate::render::{PixelCounts, RayCounts, RenderSettings, Rendered};
 use serde::Serialize;
 
 /// Everything counted and timed during one render.
@@ -17,6 +17,8 @@ pub struct RenderStatistics {
     pub picture: PictureReport,
     /// Rays by kind.
     pub rays: RayReport,
+    /// Pixels traced and interpolated.
+    pub groups: GroupReport,
     /// What was there to tessellate, and what was touched.
     pub geometry: GeometryReport,
     /// The tessellation cache.
@@ -42,6 +44,40 @@ pub struct PictureReport {
     pub spp: u32,
     /// The integrator's name on the command line.
     pub integrator: String,
+}
+
+/// What pixel groups did.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct GroupReport {
+    /// Name on the command line: off, thesis or adaptive.
+    pub mode: String,
+    /// Error aimed at, in display units.
+    pub tolerance: f32,
+    /// Pixels that rays were traced for.
+    pub traced_pixels: u64,
+    /// Pixels by why they were traced, or not.
+    pub pixels: PixelCounts,
+    /// Seconds to find out what might be seen where.
+    pub prepare_seconds: f64,
+    /// Seconds spent on tracing, summed over threads.
+    pub trace_seconds: f64,
+    /// Seconds spent on interpolating, summed over threads.
+    pub interpolate_seconds: f64,
+}
+
+impl GroupReport {
+    /// The report of a render with these settings.
+    pub fn new(settings: &RenderSettings, rendered: &Rendered) -> Self {
+        Self {
+            mode: settings.groups.to_string(),
+            tolerance: settings.tolerance,
+            traced_pixels: rendered.pixels.traced(),
+            pixels: rendered.pixels,
+            prepare_seconds: rendered.seconds.prepare,
+            trace_seconds: rendered.seconds.trace,
+            interpolate_seconds: rendered.seconds.interpolate,
+        }
+    }
 }
 
 /// Rays by kind, and their sum.

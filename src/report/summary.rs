@@ -2,6 +2,7 @@
 
 use super::quantity::{Bytes, Count, plural};
 use super::statistics::{GeometryReport, RenderStatistics, Seconds};
+use crate::render::Reason;
 use std::fmt::{self, Display, Formatter};
 
 impl Display for RenderStatistics {
@@ -9,6 +10,7 @@ impl Display for RenderStatistics {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         self.write_picture(f)?;
         self.write_rays(f)?;
+        self.write_groups(f)?;
         self.write_geometry(f)?;
         self.write_cache(f)?;
         self.write_memory(f)?;
@@ -39,6 +41,19 @@ impl RenderStatistics {
         let list = if used.is_empty() { String::new() } else { format!(": {}", used.join(", ")) };
         let rate = Count(per_second(self.rays.total, self.seconds.render));
         writeln!(f, "rays      {}{list}; {rate} a second", Count(self.rays.total))
+    }
+
+    fn write_groups(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let g = &self.groups;
+        if g.traced_pixels == self.picture.pixels_done as u64 {
+            return Ok(());
+        }
+        let (traced, share) = (Count(g.traced_pixels), percent(g.traced_pixels, self.picture.pixels_done as u64));
+        let [interpolated, background] = [Reason::Interpolated, Reason::Background].map(|r| Count(g.pixels.of(r)));
+        writeln!(
+            f,
+            "groups    {traced} pixels traced ({share}), {interpolated} interpolated, {background} of background"
+        )
     }
 
     fn write_geometry(&self, f: &mut Formatter<'_>) -> fmt::Result {
@@ -106,6 +121,9 @@ mod tests {
         let mut s = RenderStatistics { threads: 2, ..Default::default() };
         (s.picture.width, s.picture.height, s.picture.pixels, s.picture.pixels_done) = (800, 600, 480_000, 480_000);
         s.picture.spp = 1;
+        s.groups.traced_pixels = 120_000;
+        s.groups.pixels.add(Reason::Interpolated, 300_000);
+        s.groups.pixels.add(Reason::Background, 60_000);
         s.rays = RayCounts { primary: 480_000, shadow: 1_200_000, ..Default::default() }.into();
         s.seconds.render = (2.0, 4.0).into();
         (s.geometry.patches, s.geometry.patches_touched, s.geometry.grids_built) = (11_000, 10_999, 70_000);
@@ -115,6 +133,7 @@ mod tests {
         let expected = "\
 picture   800 x 600, 480,000 pixels rendered, 1 sample each
 rays      1,680,000: 480,000 primary, 1,200,000 shadow; 840,000 a second
+groups    120,000 pixels traced (25.0 %), 300,000 interpolated, 60,000 of background
 patches   10,999 of 11,000 touched (99.9 %), 70,000 grids built
 in full   91,000,000 triangles, 700.0 MiB: never built
 cache     16.0 MiB, at most 0 bytes in use; 0.0 % of 1,000 lookups hit

@@ -270,6 +270,16 @@ impl IntegratorKind {
     ];
 }
 
+impl fmt::Display for Rate {
+    /// As it is typed.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fixed(n) => write!(f, "fixed:{n}"),
+            Self::Pixels(length) => write!(f, "px:{length}"),
+        }
+    }
+}
+
 impl fmt::Display for IntegratorKind {
     /// Its name on the command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -48,19 +48,28 @@ struct Builder<'w> {
     recorder: Option<Recorder<'w>>,
 }
 
-/// Evaluates normals; remembers the last patch, which shading asks about again and again.
+/// Patches that shading remembers: camera rays, and rays mirrored or bounced, come back to the same few for a while.
+const NORMAL_LANES: usize = 16;
+
+/// Evaluates normals; remembers patches, one in each lane.
 #[derive(Default)]
 struct NormalScratch {
+    lanes: [NormalLane; NORMAL_LANES],
+}
+
+#[derive(Default)]
+struct NormalLane {
     dicer: Dicer,
     mesh: Option<MeshId>,
 }
 
 impl NormalScratch {
     fn normal(&mut self, surface: &Surface, mesh: MeshId, patch: PatchId, u: f64, v: f64) -> DVec3 {
-        if self.mesh.replace(mesh) != Some(mesh) {
-            self.dicer.forget();
+        let lane = &mut self.lanes[patch.idx() % NORMAL_LANES];
+        if lane.mesh.replace(mesh) != Some(mesh) {
+            lane.dicer.forget();
         }
-        self.dicer.normal(surface, patch, u, v)
+        lane.dicer.normal(surface, patch, u, v)
     }
 }
 

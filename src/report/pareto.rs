@@ -1,0 +1,53 @@
+//! The plot of a sweep: error against rays, with the front that no run beats.
+
+use super::tradeoff::{Tradeoff, TradeoffRun};
+use plotters::prelude::*;
+use std::error::Error;
+
+/// Colours of the ways of grouping, readable by most colour-blind people (Okabe and Ito 2008).
+const COLORS: [(&str, RGBColor); 3] =
+    [("off", RGBColor(0, 0, 0)), ("thesis", RGBColor(213, 94, 0)), ("adaptive", RGBColor(0, 114, 178))];
+
+impl Tradeoff {
+    /// An SVG picture: rays to the right (logarithmic), the 99th percentile of differences upwards.
+    pub fn to_svg(&self) -> String {
+        let mut svg = String::new();
+        self.draw(&mut svg).expect("drawing into a string does not fail");
+        svg
+    }
+
+    fn draw(&self, svg: &mut String) -> Result<(), Box<dyn Error>> {
+        let root = SVGBackend::with_string(svg, (960, 600)).into_drawing_area();
+        root.fill(&WHITE)?;
+        let rays = |run: &TradeoffRun| run.rays.max(1) as f64;
+        let fewest = self.runs.iter().map(rays).fold(f64::INFINITY, f64::min);
+        let most = self.runs.iter().map(rays).fold(1.0, f64::max);
+        let worst = self.runs.iter().map(TradeoffRun::p99).fold(1.0 / 255.0, f64::max);
+        let title = format!("{}, {} x {}: error against rays", self.input, self.width, self.height);
+        let mut chart = ChartBuilder::on(&root)
+            .caption(title, ("sans-serif", 18))
+            .margin(12)
+            .x_label_area_size(44)
+            .y_label_area_size(60)
+            .build_cartesian_2d((0.7 * fewest..1.6 * most).log_scale(), -0.02 * worst..1.1 * worst)?;
+        chart
+            .configure_mesh()
+            .x_desc("rays")
+            .y_desc("99th percentile of differences, display units")
+            .x_label_formatter(&|rays| format!("{rays:.0}"))
+            .draw()?;
+        let front = self.pareto_front().into_iter().map(|run| (rays(run), run.p99()));
+        chart.draw_series(LineSeries::new(front, RGBColor(150, 150, 150)))?;
+        for (name, color) in COLORS {
+            let runs: Vec<_> = self.runs.iter().filter(|run| run.groups == name).collect();
+            let points = runs.iter().map(|run| Circle::new((rays(run), run.p99()), 4, color.filled()));
+            chart.draw_series(points)?;
+            let labels = runs.iter().map(|run| {
+                Text::new(run.label(), (1.03 * rays(run), run.p99() + 0.015 * worst), ("sans-serif", 11).into_font())
+            });
+            chart.draw_series(labels)?;
+        }
+        root.present()?;
+        Ok(())
+    }
+}
