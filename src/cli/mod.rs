@@ -23,9 +23,9 @@ pub mod run_options;
 pub mod sample;
 pub mod stdout;
 pub mod tessellate;
-pub mod tune;
 mod thesis_tables;
 pub mod tradeoff;
+pub mod tune;
 pub mod values;
 
 use crate::error::{Error, Result};

@@ -124,7 +124,7 @@ impl TradeoffArgs {
         for rate in rates {
             settle_rates(scene, rate);
             let threads = self.run.threads();
-            let prepared = RenderScene { scene, camera: self.camera, settings }.prepare(threads, true)?;
+            let prepared = RenderScene { scene, camera: self.camera, settings, memory: None }.prepare(threads, true)?;
             let mut full = None;
             for &(groups, tolerance) in &ways {
                 progress.set(runs.len(), total);

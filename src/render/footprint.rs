@@ -36,7 +36,7 @@ const NEAR: f64 = 1e-7;
 /// Boxes on the picture are this much larger, in pixels, than computed.
 const ROUNDING: f64 = 1e-3;
 
-/// Quarters of irregular patches that boxes look into: each more makes boxes tighter, and finding them slower.
+/// Quarters of irregular parts that boxes look into: each more makes boxes tighter, and finding them slower.
 const BOX_DEPTH: u32 = 1;
 
 /// A part counts as seen from one side if its normals are so much further from edge-on, as a cosine, than they vary.
@@ -167,7 +167,7 @@ impl Footprints {
 }
 
 fn max_footprints(settings: &RenderSettings) -> usize {
-    settings.size.iter().map(|&n| n as usize).product::<usize>() / 4 + 4096
+    settings.size.iter().map(|&n| n as usize).product::<usize>() / 4 + (1 << 16)
 }
 
 fn sorted_by_block<'a>(
@@ -275,7 +275,10 @@ impl Projector<'_> {
         i: [u32; 2],
         j: [u32; 2],
     ) -> Option<ScreenBox> {
-        let bounds = self.dicer.bounds(mesh.surface(), patch, rates, i, j, BOX_DEPTH);
+        // A part's cells are a part of the patch: as many splits lead to a quarter of its size.
+        let largest = (i[1] - i[0]).max(j[1] - j[0]);
+        let depth = (rates.n_u.max(rates.n_v) / largest).ilog2() + BOX_DEPTH;
+        let bounds = self.dicer.bounds(mesh.surface(), patch, rates, i, j, depth);
         self.project(view, bounds)
     }
 

@@ -5,18 +5,18 @@
 //! is written.
 
 pub mod inventory;
+pub mod pareto;
 pub mod plot;
 mod quantity;
 pub mod statistics;
 pub mod summary;
-pub mod tuning;
-pub mod pareto;
 pub mod tradeoff;
+pub mod tuning;
 
 pub use inventory::{CacheAdvice, Inventory};
 pub use statistics::{
     CacheReport, GeometryReport, GroupReport, MemoryReport, PhaseSeconds, PictureReport, RayReport, RenderStatistics,
     Seconds,
 };
-pub use tuning::{CurvePoint, RecordedRender, Tuning};
 pub use tradeoff::{Tradeoff, TradeoffRun};
+pub use tuning::{CurvePoint, RecordedRender, Tuning};
