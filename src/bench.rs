@@ -412,6 +412,7 @@ mod tests {
             u: 0.25,
             v: 0.75,
             normal_in_object: Vec3::X,
+            on_triangle: Default::default(),
         };
         assert_eq!(face_parameters(5, &hit), [4.75, 3.25]);
         assert_eq!(face_parameters(4, &hit), [0.25, 0.75]);

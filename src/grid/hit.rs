@@ -52,22 +52,29 @@ pub struct LatticeHit {
     pub triangle: TriangleId,
     /// Weights of the triangle's second and third vertex.
     pub barycentrics: [f32; 2],
-    /// Cross product of the triangle's edges, in lattice units squared, along du x dv. Zero for a triangle without area,
-    /// which can still be hit: it fills the crack between its neighbours.
-    pub normal: Vec3,
+    /// The triangle's corners: lattice points, which f32 holds exactly.
+    pub corners: [Vec3; 3],
 }
 
 impl LatticeHit {
     /// No hit yet; hits beyond `t_max` will not be taken.
     #[inline(always)]
     pub fn none(t_max: f32) -> Self {
-        Self { t: t_max, triangle: TriangleId::NONE, barycentrics: [0.0; 2], normal: Vec3::ZERO }
+        Self { t: t_max, triangle: TriangleId::NONE, barycentrics: [0.0; 2], corners: [Vec3::ZERO; 3] }
     }
 
     /// Whether something was hit.
     #[inline(always)]
     pub fn is_some(&self) -> bool {
         self.triangle != TriangleId::NONE
+    }
+
+    /// Cross product of the triangle's edges, in lattice units squared, along du x dv. Zero for a triangle without area,
+    /// which can still be hit: it fills the crack between its neighbours.
+    #[inline]
+    pub fn normal(&self) -> Vec3 {
+        let [a, b, c] = self.corners;
+        (b - a).cross(c - a)
     }
 
     /// Place of the hit in the grid, in cells from corner 0 of the patch: (u n_u, v n_v).

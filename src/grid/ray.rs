@@ -1,10 +1,13 @@
 //! A ray made ready for boxes and triangles of the lattice.
 
 use super::TriangleId;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Greatest magnitude of a lattice coordinate of a grid vertex.
 pub const LATTICE_LIMIT: f32 = 16_777_216.0;
+
+/// By how much boxes grow, as a share of `reach` (see [`LatticeRay`]).
+const SLACK: f32 = 20.0 / 16_777_216.0;
 
 /// Rays that start outside the cube of this half-width are first moved up to it, in f64.
 const START_LIMIT: f64 = 33_554_432.0;
@@ -13,30 +16,35 @@ const START_LIMIT: f64 = 33_554_432.0;
 ///
 /// The direction is scaled by a power of two, so that its largest component is in [1, 2]: `t` inside lattice space counts in units of
 /// the scaled direction, and [`Self::caller_t`] gives it in the caller's. Components below 2^-64 of the largest count as zero.
-/// *The ray* below is the one with the rounded origin and direction; boxes and triangles see the same.
+/// *The ray* below is the one with the rounded direction, from `cell + fraction`.
 ///
 /// # Why no box hides a triangle that would be hit
 /// Write u = 2^-24 and D for the largest distance, along any axis, from the origin to a point of the lattice cube; |origin| <= 2^25, and
 /// `reach` = |origin| + 2^24 >= D.
 ///
-/// *Triangles.* A vertex v is sheared to v'_x = fl(fl(v_x - o_x) - fl(S_x fl(v_z - o_z))), |S_x| <= 1 (z stands for the axis of the largest component).
-/// Summing the five roundings, |v'_x - exact| <= u (2 |v_x - o_x| + 4 |v_z - o_z|) <= 6 u D. The signs of the edge functions are exact for these v'.
-/// If they report a hit, some point P of the exact triangle has, at its own depth, a distance of at most 6 u D along x and y from the ray.
-/// So the ray passes through every box around the triangle that is widened by 6 u D.
+/// *Triangles.* Corners are taken relative to `cell` as integers, without error, so that distances from the origin keep their relative precision:
+/// (v - o) is fl(fl(v - cell) - fraction), off by 2 u |v - o| at most. A vertex v is sheared to
+/// v'_x = fl((v - o)_x - fl(S_x (v - o)_z)), |S_x| <= 1 (z stands for the axis of the largest component). Summing the roundings,
+/// |v'_x - exact| <= u (3 |v_x - o_x| + 5 |v_z - o_z|) <= 8 u D. The signs of the edge functions are exact for these v'.
+/// If they report a hit, some point P of the exact triangle has, at its own depth, a distance of at most 8 u D along x and y from the ray.
+/// So the ray passes through every box around the triangle that is widened by 8 u D. (Nearer triangles err less: one that lies within L of the
+/// origin, by 8 u L.)
 ///
 /// *Boxes.* A plane is tested as fl(fl(plane - o) * inv), or for 8-bit boxes as fl(fl(q * step_inv) + fl(fl(base - o) * inv)) with an exact
-/// `step_inv` but for the rounding of `inv` itself. The errors, as distances along the axis, are at most 3 u D in the first case; in the second at most
-/// 2 u q step + 3 u |base - o| + u |sum| <= 8 u D, for no box is wider than 2 D.
+/// `step_inv` but for the rounding of `inv` itself, and o rounded to f32, by u |o|. The errors, as distances along the axis, are at most 3 u D in the
+/// first case; in the second at most 2 u q step + 3 u |base - o| + u |sum| <= 8 u D, for no box is wider than 2 D.
 ///
-/// Both are covered by moving the near planes towards the origin and the far planes away from it by `slack` = 16 u `reach` >= 14 u D; this
-/// is done once per ray, in `near_origin` and `far_origin`, rounded outwards. In a coordinate system of 2^24 steps, slack is 48 steps at most.
+/// All are covered by moving the near planes towards the origin and the far planes away from it by `slack` = 20 u `reach` >= 17 u `reach`; this
+/// is done once per ray, in `near_origin` and `far_origin`, rounded outwards. In a coordinate system of 2^24 steps, slack is 60 steps at most.
 ///
 /// *Zero components* have `inv` = +-2^96, by sign. Where the origin is inside a widened slab, the distance to its planes is at least 2 u `reach`, times 2^96: beyond
 /// any t; where it is outside, the entry is beyond any t likewise. No operation on finite boxes gives infinity or NaN.
 #[derive(Clone, Copy, Debug)]
 pub struct LatticeRay {
-    /// Origin, in lattice units; |coordinate| <= 2^25.
-    pub(crate) origin: [f32; 3],
+    /// The lattice point nearest to the origin; |coordinate| <= 2^25.
+    pub(crate) cell: [i32; 3],
+    /// The origin relative to `cell`, within half a step: so rays that start on the surface start where they should.
+    pub(crate) fraction: [f32; 3],
     /// Origin moved along the direction's sign by the slack: near planes are measured from it.
     pub(crate) near_origin: [f32; 3],
     /// Origin moved against the direction's sign: far planes are measured from it.
@@ -72,19 +80,22 @@ impl LatticeRay {
         let t_start = if is_valid { start(origin, scaled) } else { None };
         let t_end = t_start.map_or(-1.0, |t_start| (f64::from(t_max) / t_unit - t_start) as f32);
         let t_start = t_start.unwrap_or(0.0);
-        Self::from_start((origin + t_start * scaled).as_vec3(), scaled, t_end, skip, t_start, t_unit)
+        Self::from_start(origin + t_start * scaled, scaled, t_end, skip, t_start, t_unit)
     }
 
-    fn from_start(origin: Vec3, scaled: DVec3, t_max: f32, skip: TriangleId, t_start: f64, t_unit: f64) -> Self {
+    fn from_start(start: DVec3, scaled: DVec3, t_max: f32, skip: TriangleId, t_start: f64, t_unit: f64) -> Self {
         let direction = scaled.to_array().map(without_dust);
-        let slack = (origin.abs().max_element() + LATTICE_LIMIT) * f32::powi(2.0, -20);
+        let cell = start.round();
+        let origin = start.as_vec3();
+        let slack = (origin.abs().max_element() + LATTICE_LIMIT) * SLACK;
         let origin = origin.to_array();
         let is_negative = direction.map(|d| usize::from(d.is_sign_negative()));
         let forward = direction.map(|d| slack.copysign(d));
         let axes = shear_axes(direction);
         let [dx, dy, dz] = axes.map(|k| direction[k]);
         Self {
-            origin,
+            cell: cell.as_ivec3().to_array(),
+            fraction: (start - cell).as_vec3().to_array(),
             near_origin: std::array::from_fn(|k| moved(origin[k], forward[k])),
             far_origin: std::array::from_fn(|k| moved(origin[k], -forward[k])),
             inv: direction.map(|d| if d == 0.0 { f32::powi(2.0, 96).copysign(d) } else { 1.0 / d }),
@@ -96,6 +107,12 @@ impl LatticeRay {
             t_start,
             t_unit,
         }
+    }
+
+    /// The origin as triangles see it.
+    #[cfg(test)]
+    pub(crate) fn origin(&self) -> DVec3 {
+        DVec3::from_array(std::array::from_fn(|k| f64::from(self.cell[k]) + f64::from(self.fraction[k])))
     }
 
     /// A ray parameter of lattice space in units of the direction that [`Self::new`] was given. Monotone, finite for finite `t`.

@@ -26,7 +26,7 @@ impl PieceView<'_> {
         }
         let is_nearer = hit.triangle != before;
         if is_nearer {
-            hit.normal = self.normal(hit.triangle);
+            hit.corners = self.corners(hit.triangle);
         }
         is_nearer
     }
@@ -68,16 +68,14 @@ impl PieceView<'_> {
         TriangleId::new(patch, i as u32, j as u32, (triangle as u32 >> 1) & 1)
     }
 
-    /// Cross product of the edges of a triangle of this piece.
+    /// The corners of a triangle of this piece.
     #[inline(always)]
-    fn normal(&self, triangle: TriangleId) -> Vec3 {
+    fn corners(&self, triangle: TriangleId) -> [Vec3; 3] {
         let i = (triangle.i() - u32::from(self.head.cells.i0)) as usize;
         let j = (triangle.j() - u32::from(self.head.cells.j0)) as usize;
         let half = triangle.half() as usize;
-        let corner = |i, j| IVec3::from_array(self.vertex(i, j));
-        let (first, second, third) =
-            (corner(i + half, j + half), corner(i + 1 - half, j + half), corner(i + half, j + 1 - half));
-        (second - first).as_vec3().cross((third - first).as_vec3())
+        let corner = |i, j| IVec3::from_array(self.vertex(i, j)).as_vec3();
+        [corner(i + half, j + half), corner(i + 1 - half, j + half), corner(i + half, j + 1 - half)]
     }
 }
 
@@ -124,11 +122,12 @@ struct Rows<K: Kernel> {
 // No closures over lanes here: code that is not `#[inline(always)]` is compiled without the kernel's instructions, twenty times slower.
 impl<K: Kernel> Rows<K> {
     #[inline(always)]
-    fn load<const BYTES: usize>(piece: &PieceView, k: K, origin: f32, block: usize, axis: usize) -> Self {
+    fn load<const BYTES: usize>(piece: &PieceView, k: K, ray: &LatticeRay, block: usize, axis: usize) -> Self {
         let (column, row) = (2 * (block & 3), 2 * (block >> 2));
         let at = piece.row_start(row, axis) + BYTES * column;
         let next = piece.row_start(1, axis) - piece.row_start(0, axis);
-        let (base, origin) = (piece.head.base[axis], k.splat(origin));
+        // Relative to the ray's own lattice point: exact, whatever the distance from the lattice's centre.
+        let (base, origin) = (piece.head.base[axis] - ray.cell[axis], k.splat(ray.fraction[axis]));
         // SAFETY: `PieceView::new` checked that the bytes hold every vertex of the lanes in the head and the tail after them. `block` is one of
         // those lanes, so each place is at least three coordinates before the end of the vertices. The load reads four coordinates,
         // and for BYTES = 3 four bytes more: at most one coordinate and four bytes beyond the vertices, eight bytes, the tail's size.
@@ -164,9 +163,9 @@ impl<K: Kernel> Eight<K> {
     #[inline(always)]
     fn load<const BYTES: usize>(piece: &PieceView, k: K, ray: &LatticeRay, block: usize) -> Self {
         let [kx, ky, kz] = ray.axes;
-        let z = Rows::load::<BYTES>(piece, k, ray.origin[kz], block, kz);
-        let x = Rows::load::<BYTES>(piece, k, ray.origin[kx], block, kx).sheared(k, ray.shear[0], &z);
-        let y = Rows::load::<BYTES>(piece, k, ray.origin[ky], block, ky).sheared(k, ray.shear[1], &z);
+        let z = Rows::load::<BYTES>(piece, k, ray, block, kz);
+        let x = Rows::load::<BYTES>(piece, k, ray, block, kx).sheared(k, ray.shear[0], &z);
+        let y = Rows::load::<BYTES>(piece, k, ray, block, ky).sheared(k, ray.shear[1], &z);
         Self { x: x.corners(k), y: y.corners(k), z: z.scaled(k, ray.shear[2]).corners(k) }
     }
 

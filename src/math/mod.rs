@@ -5,4 +5,4 @@ mod ray;
 pub mod simd;
 
 pub use bounds::{Bounds, DBounds};
-pub use ray::{Hit, Intersect, PrimitiveRef, Ray};
+pub use ray::{Hit, Intersect, OnTriangle, PrimitiveRef, Ray};

@@ -53,6 +53,17 @@ pub struct Hit {
     pub v: f32,
     /// The triangle's geometric normal in object space (not normalised, along du x dv).
     pub normal_in_object: Vec3,
+    /// Where on the triangle.
+    pub on_triangle: OnTriangle,
+}
+
+/// A point of a triangle, as exact as the triangle itself: where along the ray it lies is known less well.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OnTriangle {
+    /// The corners, in lattice space of the mesh.
+    pub corners: [Vec3; 3],
+    /// Weights of the second and third corner.
+    pub weights: [f32; 2],
 }
 
 /// Whatever can answer ray queries: the lazy tracer, and the brute-force one that tests compare it with.

@@ -2,7 +2,7 @@
 
 use super::tracer::{SurfacePoint, Tracer};
 use crate::ids::{FaceId, MeshId, PatchId};
-use crate::math::{Hit, Intersect, PrimitiveRef, Ray};
+use crate::math::{Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
 use glam::DVec3;
 
 /// A surface with a formula.
@@ -54,7 +54,8 @@ impl Intersect for AnalyticTracer {
         let (i, t) = nearest.filter(|&(_, t)| t <= f64::from(ray.t_max))?;
         let primitive = PrimitiveRef { mesh: MeshId::from(i), patch: PatchId(0), cell: 0, half: 0 };
         let normal_in_object = self.shapes[i].normal(ray.origin + t * ray.direction).as_vec3();
-        Some(Hit { t: t as f32, primitive, face: FaceId(0), sub: 0, u: 0.5, v: 0.5, normal_in_object })
+        let (face, on_triangle) = (FaceId(0), OnTriangle::default());
+        Some(Hit { t: t as f32, primitive, face, sub: 0, u: 0.5, v: 0.5, normal_in_object, on_triangle })
     }
 
     fn occluded(&mut self, ray: &Ray) -> bool {
@@ -69,7 +70,7 @@ impl Tracer for AnalyticTracer {
         let t = shape.meet(ray, start).unwrap_or(f64::from(hit.t));
         let position = ray.origin + t * ray.direction;
         let normal = shape.normal(position).normalize();
-        SurfacePoint { position, geometric_normal: normal, shading_normal: normal, tex_coord: None, error: 1e-9 }
+        SurfacePoint { position, geometric_normal: normal, shading_normal: normal, tex_coord: None, clearance: 1e-9 }
     }
 
     fn patch_rate(&self, _: &PrimitiveRef) -> u32 {

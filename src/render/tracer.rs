@@ -6,7 +6,7 @@ use glam::{DVec3, Vec2};
 /// The surface at a hit, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Where the ray met the triangle.
+    /// Where the ray met the triangle; off its edges by more than `clearance`, where the triangle is large enough.
     pub position: DVec3,
     /// Unit normal of the triangle, along du × dv: outwards on a mesh with counter-clockwise faces.
     pub geometric_normal: DVec3,
@@ -14,9 +14,9 @@ pub struct SurfacePoint {
     pub shading_normal: DVec3,
     /// Texture coordinates, if the mesh has them.
     pub tex_coord: Option<Vec2>,
-    /// Bound on the distance of `position` from the triangle's plane, in world units: rays that leave the surface start
-    /// that far from it.
-    pub error: f64,
+    /// How far from `position`, in world units along the normal, rays that leave the surface start, so that they do not
+    /// meet it again.
+    pub clearance: f64,
 }
 
 /// One thread's access to the scene: ray queries, and answers about what was hit.

@@ -13,7 +13,7 @@ use crate::grid::{
 };
 use crate::ids::{MeshId, PatchId};
 use crate::math::simd::{self, Kernel, Task};
-use crate::math::{Bounds, Hit, Intersect, PrimitiveRef, Ray};
+use crate::math::{Bounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
 use crate::subdiv::{Dicer, PatchRates, Surface};
 use glam::{DVec3, Vec3};
 
@@ -444,7 +444,8 @@ impl<'w> Intersector<'w> {
             sub,
             u: u / rates.n_u as f32,
             v: v / rates.n_v as f32,
-            normal_in_object: normal_in_object(found.normal, mesh.surface().lattice().step),
+            normal_in_object: normal_in_object(found.normal(), mesh.surface().lattice().step),
+            on_triangle: OnTriangle { corners: found.corners, weights: found.barycentrics },
         }
     }
 }

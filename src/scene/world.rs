@@ -138,7 +138,9 @@ fn scene_space(all: DBounds) -> DAffine3 {
     if all.is_empty() {
         return DAffine3::IDENTITY;
     }
-    let half = (0.5 * (all.max - all.min)).max_element().max(f64::MIN_POSITIVE);
+    // Where all meshes are one point, the unit is what f64 can tell apart there.
+    let least = (all.center().abs().max_element() * f64::EPSILON).max(1e-290);
+    let half = (0.5 * (all.max - all.min)).max_element().max(least);
     let scale = 2f64.powi(22 - half.log2().ceil() as i32);
     DAffine3::from_scale(DVec3::splat(scale)) * DAffine3::from_translation(-all.center())
 }

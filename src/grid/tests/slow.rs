@@ -41,7 +41,7 @@ pub fn rounded(ray: &LatticeRay) -> (DVec3, DVec3) {
     d[kz] = 1.0 / f64::from(ray.inv[kz]);
     d[kx] = f64::from(ray.shear[0]) * d[kz];
     d[ky] = f64::from(ray.shear[1]) * d[kz];
-    (DVec3::from_array(ray.origin.map(f64::from)), DVec3::from_array(d))
+    (ray.origin(), DVec3::from_array(d))
 }
 
 /// `None` if the ray is parallel to the plane or the triangle has no area.

@@ -41,7 +41,8 @@ impl<'a> Interaction<'a> {
 
     /// A ray that leaves the surface along `direction`.
     pub fn leaving(&self, direction: DVec3) -> Ray {
-        let side = if direction.dot(self.geometric_normal) >= 0.0 { self.point.error } else { -self.point.error };
+        let side =
+            if direction.dot(self.geometric_normal) >= 0.0 { self.point.clearance } else { -self.point.clearance };
         let origin = self.point.position + side * self.geometric_normal;
         Ray { from: Some(self.hit.primitive), ..Ray::new(origin, direction) }
     }

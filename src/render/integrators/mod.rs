@@ -6,7 +6,7 @@
 //! # Conventions
 //! * Opaque surfaces are two-sided: normals are turned towards the ray. Which side of a clear body a ray meets is told
 //!   by the geometric normal, so clear bodies must be closed and their faces counter-clockwise from outside.
-//! * A ray that leaves a surface starts off it by the hit's own error bound, along the geometric normal on the side it
+//! * A ray that leaves a surface starts off it by the hit's own clearance, along the geometric normal on the side it
 //!   leaves to, and names the triangle it leaves: there is no epsilon to choose.
 //! * A chain of reflections, refractions or bounces ends after `max_depth` rays; what it would have brought is lost.
 //!
