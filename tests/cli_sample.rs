@@ -9,11 +9,15 @@ use std::path::Path;
 const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 
 fn sample(mesh: &str, places: &str) -> assert_cmd::assert::Assert {
+    sample_with(&[], mesh, places)
+}
+
+fn sample_with(options: &[&str], mesh: &str, places: &str) -> assert_cmd::assert::Assert {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("m.obj"), mesh).unwrap();
     std::fs::write(folder.path().join("s.csv"), places).unwrap();
     let mut command = Command::cargo_bin("lazytess").unwrap();
-    command.current_dir(folder.path()).args(["sample", "m.obj", "--at", "s.csv"]).assert()
+    command.current_dir(folder.path()).args(["sample", "m.obj", "--at", "s.csv"]).args(options).assert()
 }
 
 #[test]
@@ -40,6 +44,21 @@ fn mistakes_are_sentences_with_exit_code_two() {
     fails(QUAD, "0,1,0,0\n", "lazytess: s.csv: face 0 has 1 quads, counted from 0; 1 does not exist");
     fails(&format!("{QUAD}t hole 1/0/0 0\n"), "0,0,0,0\n", "lazytess: s.csv: face 0 has no surface");
     fails("v 0 0\n", "0,0,0,0\n", "lazytess: m.obj:1: a vertex needs x, y and z; z is missing");
+}
+
+#[test]
+fn hierarchical_edits_count_unless_they_are_left_out() {
+    let bump = format!("{QUAD}t vertexedit 4/3/3 3 0 0 2 0 0 1 add P value\n");
+    let height = |output: assert_cmd::assert::Assert| {
+        let text = String::from_utf8(output.success().get_output().stdout.clone()).unwrap();
+        text.lines().nth(1).unwrap().split(',').nth(6).unwrap().parse::<f64>().unwrap()
+    };
+    assert!(height(sample(&bump, "0,0,0.5,0.5\n")) > 0.4);
+    assert_eq!(height(sample_with(&["--no-edits"], &bump, "0,0,0.5,0.5\n")), 0.0);
+    let hole = format!("{QUAD}t faceedit 3/0/1 2 0 2 hole\n");
+    let message = "face 0 has no surface at u = 0.5, v = 0.75: `t faceedit` makes a hole there";
+    sample(&hole, "0,0,0.5,0.75\n").code(2).stderr(predicate::str::contains(message));
+    sample(&hole, "0,0,0.25,0.75\n").success();
 }
 
 #[test]

@@ -1,10 +1,10 @@
-//! Random control meshes: the evaluation that dices grids against the slow reference.
+//! Random control meshes, with and without hierarchical edits: the evaluation that dices grids against the slow reference.
 //!
 //! `LAZYTESS_FUZZ=START..END cargo test --test fuzz_surface` tries other seeds. A failure is shrunk and printed as a test.
 
 use lazytess::ids::FaceId;
 use lazytess::mesh::ControlMesh;
-use lazytess::mesh::random::random_mesh;
+use lazytess::mesh::random::{random_edits, random_mesh};
 use lazytess::mesh::shrink::{as_test, shrink};
 use lazytess::subdiv::refine::RefinedMesh;
 use lazytess::subdiv::surface::PatchPoints;
@@ -32,13 +32,22 @@ fn seeds() -> Range<u64> {
 
 #[test]
 fn diced_surface_is_the_reference_surface_on_random_meshes() {
+    seeds().for_each(|seed| assert_same(seed, random_mesh(seed)));
+}
+
+#[test]
+fn diced_surface_is_the_reference_surface_under_random_edits() {
     for seed in seeds() {
         let mesh = random_mesh(seed);
-        if difference(&mesh).is_some() {
-            let smallest = shrink(mesh, |m| difference(m).is_some());
-            let why = difference(&smallest).expect("shrinking keeps the failure");
-            panic!("seed {seed}: {why}\n{}", as_test(&smallest, &format!("seed_{seed}")));
-        }
+        assert_same(seed, ControlMesh { edits: random_edits(&mesh, seed), ..mesh });
+    }
+}
+
+fn assert_same(seed: u64, mesh: ControlMesh) {
+    if difference(&mesh).is_some() {
+        let smallest = shrink(mesh, |m| difference(m).is_some());
+        let why = difference(&smallest).expect("shrinking keeps the failure");
+        panic!("seed {seed}: {why}\n{}", as_test(&smallest, &format!("seed_{seed}")));
     }
 }
 
@@ -53,14 +62,17 @@ fn compare(mesh: &ControlMesh) -> Option<String> {
     let (mut points, mut evaluator) = (PatchPoints::default(), Evaluator::default());
     // Where all vertices are one point, f64 itself is the limit.
     let largest = mesh.bounds().max.abs().max(mesh.bounds().min.abs()).max_element();
-    let tolerance = 1e-6 * mesh.bounds().diagonal() + 1e-15 * largest;
+    // Edits may lead far outside the control mesh's box.
+    let half_extent = surface.lattice().step * f64::from(1 << 22);
+    let tolerance = 1e-6 * mesh.bounds().diagonal().max(half_extent) + 1e-15 * largest;
     for (face, &size) in mesh.face_sizes.iter().enumerate() {
         let face = FaceId::from(face);
         for sub in 0..if size == 4 { 1 } else { size } {
             let patch = surface.patch_of(face, sub);
             for (uv, exact) in POINTS.iter().zip(reference.limits_at(face, sub, &POINTS)) {
-                if exact.is_some() != surface.is_visible(patch) {
-                    return Some(format!("face {face}: only one of the two has a surface"));
+                let hidden = surface.edited().hide_point(patch, uv[0], uv[1]);
+                if exact.is_some() == (hidden || !surface.is_visible(patch)) {
+                    return Some(format!("face {face}, sub {sub}, uv {uv:?}: only one of the two has a surface"));
                 }
                 let Some(exact) = exact else { continue };
                 surface.load(patch, &mut points);

@@ -3,6 +3,7 @@
 mod common;
 
 use common::brute_force::BruteForce;
+use common::random::Random;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use lazytess::cache::CacheConfig;
 use lazytess::ids::MeshId;
@@ -14,31 +15,6 @@ use lazytess::scene::world::{GridCache, World, WorldMesh};
 
 /// Triangle tests that a comparison may cost.
 const BUDGET: usize = 1_000_000;
-
-/// xorshift64*: small, seeded, the same everywhere.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 * 2f64.powi(-53)
-    }
-
-    fn in_cube(&mut self) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
-    }
-
-    /// From around the box, or from within, through it.
-    fn ray(&mut self, bounds: DBounds) -> Ray {
-        let half = 0.5 * (bounds.max - bounds.min);
-        let [from, to] = [self.in_cube(), self.in_cube()].map(|p| bounds.center() + p * half);
-        let away = if self.unit() < 0.3 { 0.0 } else { bounds.diagonal() * (1.0 + 9.0 * self.unit()) };
-        let origin = from + self.in_cube().normalize_or(DVec3::X) * away;
-        Ray::new(origin, (to - origin) * (0.01 + self.unit()))
-    }
-}
 
 fn world_of(parts: Vec<(ControlMesh, DAffine3, DicingRate)>) -> World {
     World::new(parts.into_iter().map(|(mesh, place, rate)| WorldMesh::new(mesh, place, rate, 1).unwrap()).collect())

@@ -183,6 +183,9 @@ impl<'a> TargetFinder<'a> {
         loop {
             self.triangles.clear();
             for (window, is_turned) in pieces(margin) {
+                if window.has_hole(self.mesh) {
+                    return None;
+                }
                 window.dice(self.mesh, &mut self.dicer, &mut self.vertices);
                 let triangles = &mut self.triangles;
                 window.triangles(&self.vertices, |triangle| triangles.add(triangle, is_turned));

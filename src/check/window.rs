@@ -89,6 +89,11 @@ impl Window {
         dicer.dice(mesh.surface(), self.patch, &self.rates, self.i, self.j, out);
     }
 
+    /// Whether some of the cells lie in a hole.
+    pub fn has_hole(&self, mesh: &WorldMesh) -> bool {
+        mesh.surface().edited().n_hidden_cells(self.patch, &self.rates, self.i, self.j) > 0
+    }
+
     /// Calls `triangle` with the corners of every triangle; `vertices` are those of [`dice`](Self::dice).
     pub fn triangles(&self, vertices: &[Vertex], mut triangle: impl FnMut([Vertex; 3])) {
         let (columns, rows) = ((self.i[1] - self.i[0]) as usize, (self.j[1] - self.j[0]) as usize);

@@ -1,7 +1,7 @@
 //! `lazytess bench`: ray rates by a recipe that other tracers follow too.
 
 use super::camera::CameraArgs;
-use super::input::load_mesh;
+use super::input::EditArgs;
 use super::run_options::RunArgs;
 use super::values::{count, picture_size};
 use super::{PICTURE, stdout};
@@ -41,6 +41,8 @@ pub struct BenchArgs {
     size: [u32; 2],
     #[command(flatten)]
     camera: CameraArgs,
+    #[command(flatten)]
+    edits: EditArgs,
     /// Which rays to measure
     #[arg(long, value_delimiter = ',', default_value = "primary,ao,diffuse", value_name = "LIST")]
     rays: Vec<RayKind>,
@@ -98,7 +100,7 @@ struct Report {
 impl BenchArgs {
     /// Measures and prints.
     pub fn run(&self) -> Result<()> {
-        let mesh = rounded_to_f32(load_mesh(&self.mesh)?);
+        let mesh = rounded_to_f32(self.edits.load_mesh(&self.mesh)?);
         let (faces, verts, bounds) = (mesh.n_faces(), mesh.positions.len(), mesh.bounds());
         let description = self.camera.apply(CameraDescription::framing(bounds))?;
         let camera = Camera::new(&description);

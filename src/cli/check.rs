@@ -1,6 +1,6 @@
 //! `lazytess check`: is the mesh what it seems, and does its tessellation hold water?
 
-use super::input::load_mesh;
+use super::input::EditArgs;
 use super::interrupt::cancel_on_interrupt;
 use super::progress::Progress;
 use super::run_options::RunArgs;
@@ -31,6 +31,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct CheckArgs {
     /// mesh.obj
     pub mesh: PathBuf,
+    /// Hierarchical edits
+    #[command(flatten)]
+    pub edits: EditArgs,
     /// How many rays to aim
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     pub rays: u64,
@@ -103,7 +106,7 @@ impl CheckArgs {
     pub fn run(&self) -> Result<()> {
         let cancel = cancel_on_interrupt()?;
         let threads = self.threads.map_or_else(RunArgs::available_threads, |n| n as usize);
-        let mesh = load_mesh(&self.mesh)?;
+        let mesh = self.edits.load_mesh(&self.mesh)?;
         let description = DescribedMesh::of(&mesh);
         let world_from_object =
             DAffine3::from_scale_rotation_translation(DVec3::splat(self.scale), DQuat::IDENTITY, self.offset);

@@ -47,7 +47,13 @@ impl InfoArgs {
         let mut scene = load_scene(&self.input)?;
         settle_rates(&mut scene, self.picture.rate);
         let settings = self.picture.settings(&scene, Vec::new())?;
-        let render = RenderScene { scene: &scene, camera: self.picture.camera, settings: &settings, memory: None };
+        let render = RenderScene {
+            scene: &scene,
+            camera: self.picture.camera,
+            settings: &settings,
+            edits: self.picture.edits,
+            memory: None,
+        };
         let mut inventory = Inventory { input: self.input.display().to_string(), ..Default::default() };
         let meshes = render.read_meshes(false)?;
         meshes.iter().for_each(|mesh| inventory.add_control_mesh(mesh));

@@ -1,11 +1,37 @@
 //! A scene or a mesh, as the first argument of most commands.
 
+use super::PICTURE;
 use crate::error::{Error, Result};
 use crate::io::obj::read_obj_within;
 use crate::io::scene_file::read_scene;
 use crate::mesh::ControlMesh;
 use crate::scene::description::{Rate, SceneDescription};
+use clap::Args;
 use std::path::Path;
+
+/// Whether hierarchical edits count.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct EditArgs {
+    /// Leave out hierarchical edits (t vertexedit, t edgeedit, t faceedit), as OpenSubdiv 3 does
+    #[arg(long, help_heading = PICTURE)]
+    pub no_edits: bool,
+}
+
+impl EditArgs {
+    /// Reads a mesh and tells its warnings on stderr.
+    pub fn load_mesh(self, path: &Path) -> Result<ControlMesh> {
+        self.load_mesh_within(path, u64::MAX)
+    }
+
+    /// As [`load_mesh`](Self::load_mesh), while the process has at most `limit` bytes resident.
+    pub fn load_mesh_within(self, path: &Path, limit: u64) -> Result<ControlMesh> {
+        let mut mesh = load_mesh_within(path, limit)?;
+        if self.no_edits {
+            mesh.edits.clear();
+        }
+        Ok(mesh)
+    }
+}
 
 /// Reads `scene.toml`, or makes the bare scene of `mesh.obj`.
 pub fn load_scene(path: &Path) -> Result<SceneDescription> {
@@ -17,13 +43,7 @@ pub fn load_scene(path: &Path) -> Result<SceneDescription> {
     }
 }
 
-/// Reads a mesh and tells its warnings on stderr.
-pub fn load_mesh(path: &Path) -> Result<ControlMesh> {
-    load_mesh_within(path, u64::MAX)
-}
-
-/// As [`load_mesh`], while the process has at most `limit` bytes resident.
-pub fn load_mesh_within(path: &Path, limit: u64) -> Result<ControlMesh> {
+fn load_mesh_within(path: &Path, limit: u64) -> Result<ControlMesh> {
     let obj = read_obj_within(path, limit)?;
     obj.warnings.iter().for_each(|warning| eprintln!("lazytess: warning: {warning}"));
     Ok(obj.mesh)

@@ -1,7 +1,7 @@
 //! From a described scene to a picture: what all commands that render have in common.
 
 use super::camera::CameraArgs;
-use super::input::load_mesh_within;
+use super::input::EditArgs;
 use super::progress::Progress;
 use super::values::CacheSize;
 use crate::cache::CacheConfig;
@@ -31,6 +31,8 @@ pub struct RenderScene<'a> {
     pub camera: CameraArgs,
     /// What to render.
     pub settings: &'a RenderSettings,
+    /// How meshes are read.
+    pub edits: EditArgs,
     /// Bytes that the whole process may have resident.
     pub memory: Option<u64>,
 }
@@ -97,7 +99,7 @@ impl<'a> RenderScene<'a> {
         let progress = Progress::new("meshes read", quiet);
         let n = self.scene.meshes.len();
         let read = self.scene.meshes.iter().enumerate().map(|(i, description)| {
-            let mesh = load_mesh_within(&description.file, self.memory.unwrap_or(u64::MAX))?;
+            let mesh = self.edits.load_mesh_within(&description.file, self.memory.unwrap_or(u64::MAX))?;
             progress.set(i + 1, n);
             Ok(mesh)
         });

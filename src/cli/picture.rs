@@ -2,6 +2,7 @@
 
 use super::PICTURE;
 use super::camera::CameraArgs;
+use super::input::EditArgs;
 use super::values::{count, crop, display_units, picture_size};
 use crate::error::{Error, Result};
 use crate::render::{Aov, Groups, PixelRect, RenderSettings};
@@ -44,6 +45,9 @@ pub struct PictureArgs {
     /// The camera
     #[command(flatten)]
     pub camera: CameraArgs,
+    /// Hierarchical edits
+    #[command(flatten)]
+    pub edits: EditArgs,
 }
 
 impl PictureArgs {

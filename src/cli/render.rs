@@ -1,6 +1,6 @@
 //! `lazytess render`: a scene or mesh becomes a picture.
 
-use super::input::{load_scene, settle_rates};
+use super::input::{EditArgs, load_scene, settle_rates};
 use super::interrupt::cancel_on_interrupt;
 use super::job::{Prepared, RenderScene};
 use super::picture::PictureArgs;
@@ -68,6 +68,8 @@ pub struct RenderJob {
     pub camera: CameraArgs,
     /// What to render.
     pub settings: RenderSettings,
+    /// How meshes are read.
+    pub edits: EditArgs,
     /// Where the picture goes.
     pub output: PathBuf,
     /// As what.
@@ -112,6 +114,7 @@ impl RenderArgs {
             settings: self.picture.settings(&scene, self.aov)?,
             scene,
             camera: self.picture.camera,
+            edits: self.picture.edits,
             output: self.output,
             format,
             stats: self.stats,
@@ -134,8 +137,13 @@ impl RenderArgs {
 impl RenderJob {
     fn run(self, input: &str) -> Result<()> {
         let cancel = cancel_on_interrupt()?;
-        let scene =
-            RenderScene { scene: &self.scene, camera: self.camera, settings: &self.settings, memory: self.memory };
+        let scene = RenderScene {
+            scene: &self.scene,
+            camera: self.camera,
+            settings: &self.settings,
+            edits: self.edits,
+            memory: self.memory,
+        };
         let mut prepared = scene.prepare(self.threads, self.quiet)?;
         let size = self.memory.map_or(Ok(self.cache), |budget| prepared.cache_within(budget, self.threads))?;
         let cache = prepared.cache(size, self.threads)?;

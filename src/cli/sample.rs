@@ -1,6 +1,6 @@
 //! `lazytess sample`: limit positions and tangents at given places.
 
-use super::input::load_mesh;
+use super::input::EditArgs;
 use super::stdout;
 use crate::error::{Error, Result};
 use crate::io::samples::{SamplePlace, read_sample_places};
@@ -23,13 +23,16 @@ pub struct SampleArgs {
     /// CSV with face,sub,u,v in its first columns
     #[arg(long, value_name = "SAMPLES.csv")]
     pub at: PathBuf,
+    /// Hierarchical edits
+    #[command(flatten)]
+    pub edits: EditArgs,
 }
 
 impl SampleArgs {
     /// Prints a row for each place.
     pub fn run(self) -> Result<()> {
         let places = read_sample_places(&self.at)?;
-        let mesh = load_mesh(&self.mesh)?;
+        let mesh = self.edits.load_mesh(&self.mesh)?;
         let surface = Surface::new(&mesh, 1)?;
         for place in &places {
             check_place(place, &mesh, &surface).map_err(|message| Error::input(message).at(&self.at, None))?;
@@ -49,7 +52,7 @@ impl SampleArgs {
 }
 
 fn check_place(place: &SamplePlace, mesh: &ControlMesh, surface: &Surface) -> Result<(), String> {
-    let SamplePlace { face, sub, .. } = *place;
+    let SamplePlace { face, sub, u, v } = *place;
     let Some(&n) = mesh.face_sizes.get(face.idx()) else {
         return Err(format!("face {face} does not exist: the mesh has {}, counted from 0", mesh.n_faces()));
     };
@@ -57,8 +60,12 @@ fn check_place(place: &SamplePlace, mesh: &ControlMesh, surface: &Surface) -> Re
     if sub >= n_quads {
         return Err(format!("face {face} has {n_quads} quads, counted from 0; {sub} does not exist"));
     }
-    if !surface.is_visible(surface.patch_of(face, sub)) {
+    let patch = surface.patch_of(face, sub);
+    if !surface.is_visible(patch) {
         return Err(format!("face {face} has no surface: it is a hole, or at a boundary of rule 0"));
+    }
+    if surface.edited().hide_point(patch, u, v) {
+        return Err(format!("face {face} has no surface at u = {u}, v = {v}: `t faceedit` makes a hole there"));
     }
     Ok(())
 }

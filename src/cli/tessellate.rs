@@ -1,6 +1,6 @@
 //! `lazytess tessellate`: the triangles themselves.
 
-use super::input::load_mesh;
+use super::input::EditArgs;
 use super::run_options::RunArgs;
 use crate::error::Result;
 use crate::io::write::write_whole;
@@ -26,12 +26,15 @@ pub struct TessellateArgs {
     /// File to write
     #[arg(short, long, value_name = "OUT.obj")]
     pub output: PathBuf,
+    /// Hierarchical edits
+    #[command(flatten)]
+    pub edits: EditArgs,
 }
 
 impl TessellateArgs {
     /// Writes the file.
     pub fn run(&self) -> Result<()> {
-        let mesh = load_mesh(&self.mesh)?;
+        let mesh = self.edits.load_mesh(&self.mesh)?;
         let rate = DicingRate::Fixed(self.rate);
         let mesh = WorldMesh::new(mesh, DAffine3::IDENTITY, rate, RunArgs::available_threads())?;
         write_whole(&self.output, |out| {

@@ -63,8 +63,8 @@ pub(super) fn print_tables(
     let mut columns = Vec::new();
     for depth in DEPTHS {
         settle_rates(scene, Some(Rate::Fixed(1 << depth)));
-        let prepared =
-            RenderScene { scene, camera: args.camera, settings, memory: None }.prepare(args.run.threads(), true)?;
+        let prepared = RenderScene { scene, camera: args.camera, settings, memory: None, edits: args.edits }
+            .prepare(args.run.threads(), true)?;
         let mut full = None;
         let column: Result<Vec<Measured>> = READINGS
             .iter()

@@ -1,6 +1,6 @@
 //! `lazytess tradeoff`: what accuracy costs.
 
-use super::input::{load_scene, settle_rates};
+use super::input::{EditArgs, load_scene, settle_rates};
 use super::interrupt::cancel_on_interrupt;
 use super::job::{Prepared, RenderScene};
 use super::picture::PictureArgs;
@@ -62,6 +62,9 @@ pub struct TradeoffArgs {
     /// The camera
     #[command(flatten)]
     pub camera: CameraArgs,
+    /// Hierarchical edits
+    #[command(flatten)]
+    pub edits: EditArgs,
     /// Speed
     #[command(flatten)]
     pub run: RunArgs,
@@ -100,6 +103,7 @@ impl TradeoffArgs {
             groups: Groups::Off,
             tolerance: 0.0,
             camera: self.camera,
+            edits: self.edits,
         };
         picture.settings(scene, Vec::new())
     }
@@ -124,7 +128,8 @@ impl TradeoffArgs {
         for rate in rates {
             settle_rates(scene, rate);
             let threads = self.run.threads();
-            let prepared = RenderScene { scene, camera: self.camera, settings, memory: None }.prepare(threads, true)?;
+            let prepared = RenderScene { scene, camera: self.camera, settings, memory: None, edits: self.edits }
+                .prepare(threads, true)?;
             let mut full = None;
             for &(groups, tolerance) in &ways {
                 progress.set(runs.len(), total);

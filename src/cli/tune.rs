@@ -66,7 +66,13 @@ impl TuneArgs {
         let settings = self.picture.settings(&scene, Vec::new())?;
         let cancel = cancel_on_interrupt()?;
         let (threads, quiet) = (self.run.threads(), self.run.quiet);
-        let render = RenderScene { scene: &scene, camera: self.picture.camera, settings: &settings, memory: None };
+        let render = RenderScene {
+            scene: &scene,
+            camera: self.picture.camera,
+            settings: &settings,
+            edits: self.picture.edits,
+            memory: None,
+        };
         let prepared = render.prepare(threads, quiet)?;
         let size = self.run.cache();
         let mut cache = prepared.cache(size, threads)?;

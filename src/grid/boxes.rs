@@ -93,6 +93,14 @@ impl Head {
         Self { base: whole[0], exponent, format, lanes, padding: [0; 2], cells, padding_2: [0; 4], planes }
     }
 
+    /// Makes the lane's box one that no ray meets: along the ray's longest axis it is left 255 planes before it is entered,
+    /// and the test's slack is 48 at most on either side.
+    pub fn turn_inside_out(&mut self, lane: usize) {
+        for k in 0..3 {
+            (self.planes[k][lane], self.planes[k + 3][lane]) = (255, 0);
+        }
+    }
+
     /// The box of a lane as it is tested, without the ray's slack.
     #[cfg(test)]
     pub fn decoded_box(&self, lane: usize) -> IntegerBox {

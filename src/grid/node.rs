@@ -13,18 +13,22 @@ pub const NODE_BYTES: usize = HEAD_BYTES;
 const NO_FORMAT: u8 = 0;
 
 /// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `bounds` has one box in lattice units
-/// for each, u fastest; it must hold every lattice vertex of the child. `out` is [`NODE_BYTES`] long.
+/// for each, u fastest; it must hold every lattice vertex of the child. A child with an empty box is never met; one at least is not
+/// empty. `out` is [`NODE_BYTES`] long.
 #[inline]
 pub fn encode_node(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &mut [u8]) {
     debug_assert!(children.iter().all(|n| (1..=4).contains(n)));
     let [n_u, n_v] = children.map(usize::from);
     assert_eq!(bounds.len(), n_u * n_v, "one box for each child");
-    let whole = bounds.iter().map(integer_box).reduce(union).expect("a node has children");
+    let filled = bounds.iter().filter(|b| !b.is_empty());
+    let whole = filled.map(integer_box).reduce(union).expect("a node has children");
+    let lane = |c: usize| 4 * (c / n_u) + c % n_u;
     let mut boxes = [whole; 16];
-    for (c, b) in bounds.iter().enumerate() {
-        boxes[4 * (c / n_u) + c % n_u] = integer_box(b);
+    for (c, b) in bounds.iter().enumerate().filter(|c| !c.1.is_empty()) {
+        boxes[lane(c)] = integer_box(b);
     }
-    let head = Head::new(whole, &boxes, children, cells, NO_FORMAT);
+    let mut head = Head::new(whole, &boxes, children, cells, NO_FORMAT);
+    (0..bounds.len()).filter(|&c| bounds[c].is_empty()).for_each(|c| head.turn_inside_out(lane(c)));
     out.copy_from_slice(bytemuck::bytes_of(&head));
 }
 

@@ -171,7 +171,11 @@ impl Builder<'_> {
             for a in 0..n_u {
                 let c = child_cells(cells, side, a, b);
                 let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
-                self.boxes.push(self.dicer.bounds(of.mesh.surface(), of.patch, rates, i, j, depth));
+                let surface = of.mesh.surface();
+                self.boxes.push(match surface.edited().hide_cells(of.patch, rates, i, j) {
+                    true => Bounds::EMPTY,
+                    false => self.dicer.bounds(surface, of.patch, rates, i, j, depth),
+                });
             }
         }
         [n_u as u8, n_v as u8]

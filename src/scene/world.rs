@@ -296,9 +296,11 @@ impl WorldMesh {
         in_parallel(self.n_leaves(), n_threads, |range| {
             let mut sum = [0; 3];
             for leaf in range {
-                let rates = self.patch_rates(self.patch_of_leaf(PatchId::from(leaf)));
+                let patch = self.patch_of_leaf(PatchId::from(leaf));
+                let rates = self.patch_rates(patch);
                 let n_pieces = u64::from(rates.n_u.div_ceil(8)) * u64::from(rates.n_v.div_ceil(8));
-                sum[0] += rates.n_triangles();
+                sum[0] += rates.n_triangles()
+                    - 2 * self.surface.edited().n_hidden_cells(patch, &rates, [0, rates.n_u], [0, rates.n_v]);
                 sum[1] += n_pieces;
                 sum[2] += full_bytes(&rates, n_pieces);
             }

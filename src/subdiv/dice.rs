@@ -42,9 +42,16 @@ pub struct PatchRates {
     pub n_v: u32,
 }
 
+/// The next multiple of a power of two.
+fn round_up(n: u32, unit: u32) -> u32 {
+    (n + (unit - 1)) & !(unit - 1)
+}
+
 impl PatchRates {
-    fn new(sides: [u32; 4]) -> Self {
-        Self { sides, n_u: sides[0].max(sides[2]), n_v: sides[1].max(sides[3]) }
+    /// The power of two `unit` divides the numbers of cells.
+    fn new(sides: [u32; 4], unit: u32) -> Self {
+        let [n_u, n_v] = [0, 1].map(|k| round_up(sides[k].max(sides[k + 2]), unit));
+        Self { sides, n_u, n_v }
     }
 
     /// Triangles of the patch's grid.
@@ -60,30 +67,27 @@ impl Surface {
         let (face, sub) = self.face_of(patch);
         let (first, n) = self.topology().face_corners(face.0);
         if n == 4 {
-            return PatchRates::new(std::array::from_fn(|k| self.edge_rate(first + k as u32, rate)));
+            let sides = std::array::from_fn(|k| self.edge_rate(first + k as u32, rate));
+            return PatchRates::new(sides, self.edited().cell_unit(patch));
         }
         let before = (sub + n - 1) % n;
         let half = |k: u32| self.edge_rate(first + k, rate) / 2;
-        PatchRates::new([
-            half(sub),
-            self.inner_rate(face, sub, rate),
-            self.inner_rate(face, before, rate),
-            half(before),
-        ])
+        let inner = |k: u32| self.inner_rate(face, k, rate);
+        PatchRates::new([half(sub), inner(sub), inner(before), half(before)], self.edited().cell_unit(patch))
     }
 
     /// [`patch_rates`](Self::patch_rates) for the same rate everywhere.
     pub fn uniform_rates(&self, patch: PatchId, n: u32) -> PatchRates {
-        if self.topology().all_quads() {
-            return PatchRates::new([n.clamp(1, MAX_RATE); 4]);
+        if self.topology().all_quads() && !self.edited().has_holes() {
+            return PatchRates::new([n.clamp(1, MAX_RATE); 4], 1);
         }
         self.patch_rates(patch, &|_, _| n)
     }
 
     fn edge_rate(&self, h: u32, rate: &impl Fn(DVec3, DVec3) -> u32) -> u32 {
         let [a, b] = [h, self.topology().next(h)].map(|h| self.object_point(self.topology().vertex(h)));
-        let r = rate(a, b).clamp(1, MAX_RATE);
-        if self.topology().touches_polygon(h) { r.next_multiple_of(2) } else { r }
+        let halves = if self.topology().touches_polygon(h) { 2 } else { 1 };
+        round_up(rate(a, b).clamp(1, MAX_RATE), halves.max(self.edited().edge_unit(self.topology(), h)))
     }
 
     /// The rate from the middle of edge `k` of a polygon to its centre: half that of twice the way.
@@ -92,7 +96,8 @@ impl Surface {
         let corner = |k: u32| self.object_point(self.topology().vertex(first + k % n));
         let center = (0..n).map(corner).sum::<DVec3>() / f64::from(n);
         let middle = 0.5 * (corner(k) + corner(k + 1));
-        rate(middle, middle + 2.0 * (center - middle)).clamp(1, MAX_RATE).div_ceil(2)
+        let whole = rate(middle, middle + 2.0 * (center - middle)).clamp(1, MAX_RATE);
+        round_up(whole.div_ceil(2), self.edited().inner_unit(face))
     }
 
     /// A control point in object space.

@@ -97,7 +97,7 @@ pub struct Evaluator {
 
 /// A rectangle of a tensor grid of parameters, and where its points go.
 #[derive(Clone, Copy)]
-struct Target {
+pub(super) struct Target {
     /// Ranges in `Evaluator::params`.
     us: (usize, usize),
     vs: (usize, usize),
@@ -121,7 +121,7 @@ fn control_points(rows: &SparseRows, points: &[Point]) -> ControlPoints {
 }
 
 /// Where a polygon's child or a quad's quarter lies: its corner in units of its size.
-fn quarter(k: usize) -> (f64, f64) {
+pub(super) fn quarter(k: usize) -> (f64, f64) {
     [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][k]
 }
 
@@ -147,15 +147,29 @@ impl Evaluator {
         vs: impl IntoIterator<Item = f64>,
         out: &mut [Point],
     ) {
+        let ring = self.start_ring(ring);
+        let target = self.start_grid(us, vs);
+        self.walk(library, node, ring, 0, target, out);
+    }
+
+    /// Forgets other points; returns where the ring starts.
+    pub(super) fn start_ring(&mut self, ring: &[Point]) -> usize {
         self.points.clear();
         self.points.extend_from_slice(ring);
+        0
+    }
+
+    /// Forgets other parameters; returns the whole grid.
+    pub(super) fn start_grid(
+        &mut self,
+        us: impl IntoIterator<Item = f64>,
+        vs: impl IntoIterator<Item = f64>,
+    ) -> Target {
         self.params.clear();
         self.params.extend(us);
         let n_u = self.params.len();
         self.params.extend(vs);
-        let n = self.params.len();
-        let target = Target { us: (0, n_u), vs: (n_u, n), first: 0, stride: n_u };
-        self.walk(library, node, 0, 0, target, out);
+        Target { us: (0, n_u), vs: (n_u, self.params.len()), first: 0, stride: n_u }
     }
 
     /// As [`grid`](Self::grid) for 16 B-spline control points.
@@ -166,15 +180,11 @@ impl Evaluator {
         vs: impl IntoIterator<Item = f64>,
         out: &mut [Point],
     ) {
-        self.params.clear();
-        self.params.extend(us);
-        let n_u = self.params.len();
-        self.params.extend(vs);
-        let target = Target { us: (0, n_u), vs: (n_u, self.params.len()), first: 0, stride: n_u };
+        let target = self.start_grid(us, vs);
         self.regular(control, target, out);
     }
 
-    fn walk(
+    pub(super) fn walk(
         &mut self,
         library: &PlanLibrary,
         node: NodeId,
@@ -202,24 +212,61 @@ impl Evaluator {
         }
         let refined = self.refine(rows, ring);
         let marks = (self.points.len(), self.params.len());
-        let split = |params: &[f64], (a, b): (usize, usize)| a + params[a..b].partition_point(|&t| t < 0.5);
-        let (mid_u, mid_v) = (split(&self.params, target.us), split(&self.params, target.vs));
+        let middle = self.middle(&target);
         for (k, child) in children.iter().enumerate() {
-            let (x, y) = quarter(k);
-            let us = if x == 0.0 { (target.us.0, mid_u) } else { (mid_u, target.us.1) };
-            let vs = if y == 0.0 { (target.vs.0, mid_v) } else { (mid_v, target.vs.1) };
-            if us.0 == us.1 || vs.0 == vs.1 {
-                continue;
+            if let Some(part) = self.quarter_target(&target, middle, k) {
+                let child_ring = self.push_child(child, refined);
+                self.walk(library, child.node, child_ring, depth + 1, part, out);
+                self.points.truncate(marks.0);
+                self.params.truncate(marks.1);
             }
-            let first = target.first + (us.0 - target.us.0) + (vs.0 - target.vs.0) * target.stride;
-            let us = self.push_params(us, x);
-            let vs = self.push_params(vs, y);
-            let child_ring = self.push_child(child, refined);
-            self.walk(library, child.node, child_ring, depth + 1, Target { us, vs, first, stride: target.stride }, out);
-            self.points.truncate(marks.0);
-            self.params.truncate(marks.1);
         }
         self.points.truncate(refined);
+        self.set_corners(limits, ring, &target, out);
+    }
+
+    /// Corners whose limit is known here, in place of what deeper parts made of them: a point alone comes no further than
+    /// this, and must not depend on its company.
+    fn set_corners(&self, limits: &[Limit], ring: usize, target: &Target, out: &mut [Point]) {
+        let (n_u, n_v) = (target.us.1 - target.us.0, target.vs.1 - target.vs.0);
+        for (k, limit) in limits.iter().enumerate() {
+            let (x, y) = quarter(k);
+            let (i, j) = (if x == 0.0 { 0 } else { n_u - 1 }, if y == 0.0 { 0 } else { n_v - 1 });
+            let is_wanted = self.params[target.us.0 + i] == x && self.params[target.vs.0 + j] == y;
+            if let (true, Limit::Position(rows) | Limit::Smooth(rows)) = (is_wanted, limit) {
+                out[target.first + j * target.stride + i] = product(rows, 0, &self.points[ring..]);
+            }
+        }
+    }
+
+    /// Where the upper halves of the target's parameters begin.
+    #[inline(always)]
+    pub(super) fn middle(&self, target: &Target) -> (usize, usize) {
+        let split = |(a, b): (usize, usize)| a + self.params[a..b].partition_point(|&t| t < 0.5);
+        (split(target.us), split(target.vs))
+    }
+
+    /// The part of a target in quarter `k`, its parameters pushed as the quarter sees them; none if it has no points.
+    #[inline(always)]
+    pub(super) fn quarter_target(&mut self, target: &Target, middle: (usize, usize), k: usize) -> Option<Target> {
+        let (x, y) = quarter(k);
+        let us = if x == 0.0 { (target.us.0, middle.0) } else { (middle.0, target.us.1) };
+        let vs = if y == 0.0 { (target.vs.0, middle.1) } else { (middle.1, target.vs.1) };
+        if us.0 == us.1 || vs.0 == vs.1 {
+            return None;
+        }
+        let first = target.first + (us.0 - target.us.0) + (vs.0 - target.vs.0) * target.stride;
+        let us = self.push_params(us, x);
+        let vs = self.push_params(vs, y);
+        Some(Target { us, vs, first, stride: target.stride })
+    }
+
+    pub(super) fn n_params(&self) -> usize {
+        self.params.len()
+    }
+
+    pub(super) fn truncate_params(&mut self, n: usize) {
+        self.params.truncate(n);
     }
 
     fn fill(&self, target: Target, p: Point, out: &mut [Point]) {
@@ -273,11 +320,21 @@ impl Evaluator {
 
     /// Position and tangents at one point.
     pub fn sample(&mut self, library: &PlanLibrary, node: NodeId, ring: &[Point], u: f64, v: f64) -> SurfaceSample {
-        self.points.clear();
-        self.points.extend_from_slice(ring);
-        let (mut node, mut ring, mut u, mut v) = (node, 0, u, v);
-        let mut scale = 1.0;
-        for depth in 0.. {
+        self.sample_part(library, node, ring, [u, v], 0)
+    }
+
+    /// As [`sample`](Self::sample), where the node is `depth` splits below the patch.
+    pub(super) fn sample_part(
+        &mut self,
+        library: &PlanLibrary,
+        node: NodeId,
+        ring: &[Point],
+        [mut u, mut v]: [f64; 2],
+        depth: u32,
+    ) -> SurfaceSample {
+        let (mut node, mut ring) = (node, self.start_ring(ring));
+        let mut scale = f64::from(depth).exp2();
+        for depth in depth.. {
             match library.plan(node) {
                 Plan::Regular(rows) => {
                     return regular_sample(&control_points(rows, &self.points[ring..]), u, v, scale);
@@ -313,10 +370,9 @@ impl Evaluator {
         v: [f64; 2],
         depth: u32,
     ) -> DBounds {
-        self.points.clear();
-        self.points.extend_from_slice(ring);
+        let ring = self.start_ring(ring);
         let mut bounds = DBounds::EMPTY;
-        self.bound(library, node, 0, u, v, depth, &mut bounds);
+        self.bound(library, node, ring, u, v, depth, &mut bounds);
         bounds
     }
 
@@ -376,7 +432,7 @@ pub fn grow_by_hull(bounds: &mut DBounds, control: &ControlPoints, u: [f64; 2], 
 }
 
 /// The part of a parameter range that lies in the lower (0) or upper (1) half, as the half sees it.
-fn half_range([a, b]: [f64; 2], offset: f64) -> Option<[f64; 2]> {
+pub(super) fn half_range([a, b]: [f64; 2], offset: f64) -> Option<[f64; 2]> {
     let range = [(2.0 * a - offset).max(0.0), (2.0 * b - offset).min(1.0)];
     (range[0] <= range[1]).then_some(range)
 }

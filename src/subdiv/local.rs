@@ -33,6 +33,8 @@ pub struct Extracted {
     pub mesh: LocalMesh,
     /// Vertex of the source mesh for each local vertex.
     pub sources: Vec<u32>,
+    /// Half-edge of the source mesh where each local face starts.
+    pub starts: Vec<u32>,
 }
 
 impl HalfEdges for LocalMesh {
@@ -252,6 +254,25 @@ impl RingWalker {
     }
 }
 
+/// As [`extract`], with all faces at the target's corners, whatever sharp or non-manifold edges lie between: edits can reach
+/// across those. `spokes` lists the half-edges that start at a vertex. Faces but the target start as they do in `mesh`, so
+/// that of a face's passages of an edge the first stays the first.
+pub fn extract_whole<M: HalfEdges + ?Sized>(
+    mesh: &M,
+    first: u32,
+    outer_tags: bool,
+    spokes: impl Fn(u32) -> Vec<u32>,
+) -> Extracted {
+    let mut x = Extractor { source: mesh, starts: Vec::new(), place_of_face: FxHashMap::default() };
+    x.add_face(first);
+    let (start, n_corners) = mesh.face_corners(mesh.face(first));
+    let corners: Vec<u32> = (0..n_corners).map(|k| start + (first - start + k) % n_corners).collect();
+    let touching = corners.iter().flat_map(|&h| spokes(mesh.vertex(h))).map(|spoke| mesh.face(spoke));
+    touching.for_each(|face| x.add_face(mesh.face_corners(face).0));
+    let corner_tags: Vec<VertexTags> = corners.iter().map(|&h| mesh.vertex_tags(h)).collect();
+    x.finish(&corner_tags, outer_tags)
+}
+
 struct Extractor<'a, M: ?Sized> {
     source: &'a M,
     /// Half-edge of the source where each local face starts.
@@ -303,7 +324,7 @@ impl<M: HalfEdges + ?Sized> Extractor<'_, M> {
         }
         mesh.twin = half_edges.iter().map(|&h| self.local(&mesh, self.source.twin(h))).collect();
         self.set_tags(&mut mesh, &half_edges, sources.len(), corner_tags, outer_tags);
-        Extracted { mesh, sources }
+        Extracted { mesh, sources, starts: self.starts }
     }
 
     /// The local number of a half-edge of the source, or [`NONE`].

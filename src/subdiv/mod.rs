@@ -17,14 +17,15 @@
 //!
 //! # Invariants
 //! 1. Rows are computed in f64, sharpness in f32 (as OpenSubdiv does: see the rules' precision).
-//! 2. A point's value does not depend on which other points are evaluated with it, patch corners aside.
+//! 2. A point's value does not depend on which other points are evaluated with it.
 //! 3. Two evaluations of one surface point, from whatever patches, differ by less than [`dice::GUARD`] lattice steps;
 //!    rounding to the lattice with that guard makes shared borders equal to the bit.
 //!
 //! Sources: Catmull & Clark 1978; Stam 1998; Nießner et al. 2012; Brainerd et al. 2016 (plans); OpenSubdiv's rules.
-//! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`dice`]. [`refine`] is the slow reference.
+//! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`dice`], [`edits`]. [`refine`] is the slow reference.
 
 pub mod dice;
+pub mod edits;
 pub mod eval;
 pub mod local;
 pub mod plan;

@@ -126,6 +126,11 @@ impl PlanLibrary {
         self.nodes[node.0 as usize].as_ref().expect("nodes are complete once the library is built")
     }
 
+    /// The options that all its meshes share.
+    pub fn rules(&self) -> RuleSet {
+        self.rules
+    }
+
     /// Whether rings keep the semi-sharp edges of vertices that are not corners of their target.
     pub fn outer_tags(&self) -> bool {
         self.rules.crease_method == CreaseMethod::Chaikin
@@ -255,7 +260,7 @@ impl PlanLibrary {
 }
 
 /// Child `k`'s first half-edge in the refined ring: quarters of quads are turned so that their corner k is the face's.
-fn child_start(n_corners: u32, k: u32) -> u32 {
+pub(super) fn child_start(n_corners: u32, k: u32) -> u32 {
     if n_corners == 4 { 4 * k + (4 - k) % 4 } else { 4 * k }
 }
 

@@ -150,4 +150,4 @@ impl RefinedMesh<'_> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

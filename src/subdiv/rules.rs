@@ -77,7 +77,7 @@ pub fn decay_tags(method: CreaseMethod, tags: &VertexTags) -> VertexTags {
     let mut semi_sharp: Vec<f32> =
         tags.semi_sharp.iter().map(|&s| decay_edge(method, s, &tags.semi_sharp)).filter(|&s| s > 0.0).collect();
     semi_sharp.sort_by(f32::total_cmp);
-    VertexTags { sharpness: decay(tags.sharpness), n_infinite: tags.n_infinite, semi_sharp }
+    VertexTags { sharpness: decay(tags.sharpness), semi_sharp, ..*tags }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -1,5 +1,6 @@
 //! One mesh ready for evaluation: topology, control points in lattice units, and the plan of every face.
 
+use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, grow_by_hull, sample_regular};
 use super::local::{RingWalker, extract};
 use super::plan::{NodeId, PlanLibrary};
@@ -57,6 +58,9 @@ impl Lattice {
 /// The plan of a quad whose ring is 3 x 3 quads without any tag.
 const REGULAR: NodeId = NodeId(u32::MAX);
 
+/// In place of the plan of a face under hierarchical edits.
+const EDITED: NodeId = NodeId(u32::MAX - 1);
+
 /// A mesh whose limit surface can be evaluated.
 #[derive(Debug)]
 pub struct Surface {
@@ -67,6 +71,7 @@ pub struct Surface {
     plan_of_face: Vec<NodeId>,
     /// First patch of each face, then the total; `None` if every face is one patch.
     first_patch: Option<Vec<u32>>,
+    edited: EditedPatches,
 }
 
 /// The points that decide one patch.
@@ -104,16 +109,47 @@ impl Surface {
     /// Prepares a mesh, on `n_threads` threads.
     pub fn new(mesh: &ControlMesh, n_threads: usize) -> Result<Self> {
         let topology = Topology::new(mesh);
-        let lattice = Lattice::new(mesh.bounds());
-        let to_f32 = |p: &DVec3| lattice.from_object(*p).as_vec3().to_array();
-        let control = mesh.positions.iter().map(to_f32).collect();
         let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
-        let (library, plan_of_face) = plan_faces(&topology, rules, n_threads.max(1));
+        let sites = EditSites::new(&mesh.edits, &topology);
+        let (library, plan_of_face) = plan_faces(&topology, rules, n_threads.max(1), &sites);
         let first_patch = (!topology.all_quads()).then(|| first_patches(&mesh.face_sizes));
         if first_patch.as_ref().is_some_and(|f| f.last().is_some_and(|&n| n > u32::MAX / 2)) {
             return Err(Error::input("the mesh has more than 2^31 patches: split it"));
         }
-        Ok(Self { topology, lattice, control, library, plan_of_face, first_patch })
+        let lattice = Lattice { center: DVec3::ZERO, step: 1.0 };
+        let (control, edited) = (Vec::new(), EditedPatches::default());
+        let mut surface = Self { topology, lattice, control, library, plan_of_face, first_patch, edited };
+        surface.place(mesh, &sites)?;
+        surface.library.seal();
+        Ok(surface)
+    }
+
+    /// Chooses the lattice and puts control points and edits on it.
+    fn place(&mut self, mesh: &ControlMesh, sites: &EditSites) -> Result<()> {
+        let positions = control_positions(mesh);
+        let mut bounds: DBounds = mesh.face_vertices.iter().map(|v| positions[v.idx()]).collect();
+        if !sites.is_empty() {
+            // Where edits lead is known once they have been made, in object space for now.
+            let point = |v: u32| point(positions[v as usize]);
+            bounds = bounds.union(self.edit(mesh, sites, &point)?.bounds());
+        }
+        self.lattice = Lattice::new(bounds);
+        self.control = positions.iter().map(|p| self.lattice.from_object(*p).as_vec3().to_array()).collect();
+        let control = std::mem::take(&mut self.control);
+        self.edited = self.edit(mesh, sites, &|v| lattice_point(&control, v))?;
+        self.control = control;
+        Ok(())
+    }
+
+    fn edit(
+        &mut self,
+        mesh: &ControlMesh,
+        sites: &EditSites,
+        control_point: &dyn Fn(u32) -> Point,
+    ) -> Result<EditedPatches> {
+        let first_patch = self.first_patch.as_deref();
+        let patch_of = |face, sub| patch_of(first_patch, face, sub);
+        EditedPatches::new(mesh, &self.topology, sites, &mut self.library, self.lattice, control_point, patch_of)
     }
 
     /// Half-edges and tags.
@@ -149,12 +185,17 @@ impl Surface {
 
     /// The patch of a face's sub-quad.
     pub fn patch_of(&self, face: FaceId, sub: u32) -> PatchId {
-        PatchId(self.first_patch.as_ref().map_or(face.0, |first| first[face.idx()]) + sub)
+        patch_of(self.first_patch.as_deref(), face, sub)
     }
 
-    /// Whether the patch has a surface.
+    /// Whether the patch has a surface, or parts of one.
     pub fn is_visible(&self, patch: PatchId) -> bool {
-        !self.topology.is_hidden(self.face_of(patch).0)
+        !self.topology.is_hidden(self.face_of(patch).0) && !self.edited.hide(patch)
+    }
+
+    /// What hierarchical edits made of patches: holes in them, above all.
+    pub fn edited(&self) -> &EditedPatches {
+        &self.edited
     }
 
     /// Patches that have a surface.
@@ -175,8 +216,7 @@ impl Surface {
     /// A control point in lattice units.
     #[inline]
     pub fn control_point(&self, vertex: u32) -> Point {
-        let [x, y, z] = self.control[vertex as usize];
-        Point::new(f64::from(x), f64::from(y), f64::from(z))
+        lattice_point(&self.control, vertex)
     }
 
     /// Bytes of the control points.
@@ -191,6 +231,7 @@ impl Surface {
             + self.library.bytes()
             + 4 * self.plan_of_face.len()
             + self.first_patch.as_ref().map_or(0, |f| 4 * f.len())
+            + self.edited.bytes()
     }
 
     /// Fetches what decides a patch, unless `points` holds it already.
@@ -207,6 +248,9 @@ impl Surface {
             points.control = vertices.map(|v| self.control_point(v));
             return;
         }
+        if points.node == EDITED {
+            return;
+        }
         let sources = points.walker.sources(&self.topology, first, self.library.outer_tags());
         points.ring.clear();
         if size == 4 {
@@ -217,6 +261,12 @@ impl Surface {
             let (parent, ring) = (&points.parent, &mut points.ring);
             points.node = Evaluator::child_ring(&self.library, points.node, parent, sub as usize, ring);
         }
+    }
+
+    /// The quadtree of a patch under edits.
+    fn tree(&self, points: &PatchPoints) -> Option<&EditTree> {
+        let patch = points.patch.filter(|_| points.node == EDITED)?;
+        Some(self.edited.tree(patch))
     }
 
     /// Positions on a tensor grid of parameters, in lattice units; see [`Evaluator::grid`].
@@ -230,6 +280,8 @@ impl Surface {
     ) {
         if points.node == REGULAR {
             evaluator.regular_grid(&points.control, us, vs, out);
+        } else if let Some(tree) = self.tree(points) {
+            evaluator.edited_grid(&self.library, tree, us, vs, out);
         } else {
             evaluator.grid(&self.library, points.node, &points.ring, us, vs, out);
         }
@@ -239,6 +291,8 @@ impl Surface {
     pub fn sample(&self, points: &PatchPoints, evaluator: &mut Evaluator, u: f64, v: f64) -> SurfaceSample {
         if points.node == REGULAR {
             sample_regular(&points.control, u, v)
+        } else if let Some(tree) = self.tree(points) {
+            evaluator.edited_sample(&self.library, tree, u, v)
         } else {
             evaluator.sample(&self.library, points.node, &points.ring, u, v)
         }
@@ -263,10 +317,25 @@ impl Surface {
             let mut bounds = DBounds::EMPTY;
             grow_by_hull(&mut bounds, &points.control, u, v);
             bounds
+        } else if let Some(tree) = self.tree(points) {
+            evaluator.edited_bounds(&self.library, tree, u, v, depth)
         } else {
             evaluator.bounds(&self.library, points.node, &points.ring, u, v, depth)
         }
     }
+}
+
+fn point(p: DVec3) -> Point {
+    Point::new(p.x, p.y, p.z)
+}
+
+fn lattice_point(control: &[[f32; 3]], vertex: u32) -> Point {
+    let [x, y, z] = control[vertex as usize];
+    Point::new(f64::from(x), f64::from(y), f64::from(z))
+}
+
+fn patch_of(first_patch: Option<&[u32]>, face: FaceId, sub: u32) -> PatchId {
+    PatchId(first_patch.map_or(face.0, |first| first[face.idx()]) + sub)
 }
 
 fn first_patches(sizes: &[u32]) -> Vec<u32> {
@@ -330,7 +399,7 @@ fn is_quad(topology: &Topology, h: u32) -> bool {
 const FACES_PER_TASK: usize = 4096;
 
 /// The plan of every visible face. Node numbers depend on which thread comes first; what they mean does not.
-fn plan_faces(topology: &Topology, rules: RuleSet, n_threads: usize) -> (PlanLibrary, Vec<NodeId>) {
+fn plan_faces(topology: &Topology, rules: RuleSet, n_threads: usize, sites: &EditSites) -> (PlanLibrary, Vec<NodeId>) {
     let library = RwLock::new(PlanLibrary::new(rules));
     let mut plans = vec![REGULAR; topology.n_faces()];
     let tasks: Vec<_> = plans.chunks_mut(FACES_PER_TASK).enumerate().map(parking_lot::Mutex::new).collect();
@@ -339,7 +408,8 @@ fn plan_faces(topology: &Topology, rules: RuleSet, n_threads: usize) -> (PlanLib
         while let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
             let (chunk, plans) = &mut *task.lock();
             for (i, plan) in plans.iter_mut().enumerate() {
-                *plan = plan_face(topology, &library, FaceId::from(*chunk * FACES_PER_TASK + i));
+                let face = FaceId::from(*chunk * FACES_PER_TASK + i);
+                *plan = if sites.contains(face) { EDITED } else { plan_face(topology, &library, face) };
             }
         }
     };
@@ -350,9 +420,7 @@ fn plan_faces(topology: &Topology, rules: RuleSet, n_threads: usize) -> (PlanLib
         work();
     });
     drop(tasks);
-    let mut library = library.into_inner();
-    library.seal();
-    (library, plans)
+    (library.into_inner(), plans)
 }
 
 fn plan_face(topology: &Topology, library: &RwLock<PlanLibrary>, face: FaceId) -> NodeId {

@@ -3,7 +3,7 @@
 use super::face_index::FaceIndex;
 use super::half_edges::{HalfEdges, NONE, VertexTags, fan, fan_size};
 use crate::ids::{FaceId, VertexId};
-use crate::mesh::{BoundaryRule, ControlMesh, CreaseMethod, TriangleRule};
+use crate::mesh::{BoundaryRule, ControlMesh, CreaseMethod, Edit, EditKind, TriangleRule};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 /// Sharpness at and above which an edge or vertex is infinitely sharp (OpenSubdiv `Sdc::Crease::SHARPNESS_INFINITE`).
@@ -27,7 +27,7 @@ pub struct Topology {
     /// Ends of the two non-manifold edges of inner vertices of fins, which are crease vertices.
     fin_ends: FxHashMap<u32, [u32; 2]>,
     /// For half-edges of non-manifold edges: the smallest half-edge between the same vertices.
-    nonmanifold_edge_owner: FxHashMap<u32, u32>,
+    pub(super) nonmanifold_edge_owner: FxHashMap<u32, u32>,
     /// For non-manifold vertices: the smallest half-edge that starts there.
     nonmanifold_vertex_owner: FxHashMap<u32, u32>,
     /// A bit per face without surface, if there is any.
@@ -89,7 +89,12 @@ impl Topology {
         let nonmanifold = topology.pair_twins(&by_vertex);
         let infinite = topology.tag_edges(mesh, &by_vertex);
         drop(by_vertex);
+        if !mesh.edits.is_empty() {
+            topology.separate_passages();
+        }
+        topology.edit_edges(mesh);
         topology.tag_vertices(mesh, &nonmanifold);
+        topology.edit_vertices(mesh);
         topology.hide_faces(mesh, &infinite, &nonmanifold);
         topology
     }
@@ -228,6 +233,23 @@ impl Topology {
         self.vertex_sharpness.insert(v, sharpness);
     }
 
+    pub(super) fn edit_vertex_sharpness(&mut self, v: u32, sharpness: f32) {
+        self.set_vertex_sharpness(v, sharpness);
+        if let Some(tags) = self.nonmanifold_tags.get_mut(&v) {
+            tags.sharpness = sharpness;
+        }
+    }
+
+    /// For edges with a twin.
+    pub(super) fn set_edge_sharpness(&mut self, h: u32, sharpness: f32) {
+        let twin = self.twin[h as usize];
+        for end in [h, twin] {
+            set_bit(&mut self.tagged, self.vertex[end as usize].0);
+        }
+        self.edge_sharpness.insert(h.min(twin), sharpness);
+        self.edge_sharpness.retain(|_, s| *s > 0.0);
+    }
+
     /// Infinitely sharp, unless the vertex is an inner vertex of a fin: exactly two non-manifold edges, no boundary
     /// edge, more faces than edges.
     fn tag_nonmanifold_vertex(&mut self, v: u32, outgoing: &[u32], nonmanifold: &[NonmanifoldEdge]) {
@@ -259,6 +281,7 @@ impl Topology {
             self.set_vertex_sharpness(v, f32::INFINITY);
         }
         set_bit(&mut self.tagged, v);
+        tags.is_pinned = !is_fin;
         tags.sharpness = self.vertex_sharpness.get(&v).copied().unwrap_or(0.0);
         self.nonmanifold_tags.insert(v, tags);
         if let Some(&owner) = outgoing.iter().min() {
@@ -267,11 +290,13 @@ impl Topology {
     }
 
     fn hide_faces(&mut self, mesh: &ControlMesh, infinite: &FxHashSet<[u32; 2]>, nonmanifold: &[NonmanifoldEdge]) {
-        if mesh.holes.is_empty() && mesh.boundary != BoundaryRule::None {
+        let edited = mesh.edits.iter().filter(|e| e.kind == EditKind::Face && e.children().is_empty());
+        let mut holes = mesh.holes.iter().copied().chain(edited.map(Edit::face)).peekable();
+        if holes.peek().is_none() && mesh.boundary != BoundaryRule::None {
             return;
         }
         let mut hidden = vec![0u64; mesh.n_faces() / 64 + 1];
-        for face in &mesh.holes {
+        for face in holes {
             set_bit(&mut hidden, face.0);
         }
         if mesh.boundary == BoundaryRule::None {
@@ -355,6 +380,14 @@ impl Topology {
         }
     }
 
+    /// One number for all half-edges of an edge, seen or hidden, non-manifold or not.
+    pub fn edge_id(&self, h: u32) -> u32 {
+        match self.twin[h as usize] {
+            NONE => self.nonmanifold_edge_owner.get(&h).copied().unwrap_or(h),
+            twin => h.min(twin),
+        }
+    }
+
     /// The half-edge in whose name the limit of the vertex at the start of `h` is computed.
     pub fn vertex_owner(&self, h: u32) -> u32 {
         let visible = |h: &u32| !self.is_hidden(FaceId(self.faces.face(*h)));
@@ -408,7 +441,7 @@ impl Topology {
         let mut tags = VertexTags {
             sharpness: self.vertex_sharpness.get(&v).copied().unwrap_or(0.0),
             n_infinite: if fan.closed { 0 } else { 2 },
-            semi_sharp: Vec::new(),
+            ..Default::default()
         };
         for &spoke in fan.spokes.iter().filter(|&&h| self.twin[h as usize] != NONE) {
             match self.edge_sharpness(spoke) {

@@ -12,6 +12,8 @@ pub struct VertexTags {
     pub n_infinite: u32,
     /// Sharpness of the semi-sharp edges at the vertex, all sectors counted, ascending.
     pub semi_sharp: Vec<f32>,
+    /// Infinitely sharp for being non-manifold: no edit changes that.
+    pub is_pinned: bool,
 }
 
 impl VertexTags {

@@ -24,6 +24,7 @@
 //! Rules: Pixar's OpenSubdiv, "Subdivision Surfaces"; half-edge refinement: Dupuy & Vanhoey 2021.
 
 mod build;
+mod edits;
 mod face_index;
 mod half_edges;
 

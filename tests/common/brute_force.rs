@@ -69,6 +69,9 @@ impl<'w> BruteForce<'w> {
         let mesh = self.world.mesh(hit.primitive.mesh);
         let patch = self.meshes[hit.primitive.mesh.idx()].iter().find(|p| p.id == hit.primitive.patch);
         let patch = patch.expect("a patch that is hit has a surface");
+        if mesh.surface().edited().hide_cell(patch.id, &patch.rates, hit.primitive.cell) {
+            return Some(format!("cell {} of patch {} lies in a hole", hit.primitive.cell, patch.id));
+        }
         let triangle = patch.triangles[2 * hit.primitive.cell as usize + usize::from(hit.primitive.half)];
         let [a, b] = weights(&patch.rates, hit);
         if a.min(b).min(1.0 - a - b) < -1e-4 {
@@ -82,7 +85,9 @@ impl<'w> BruteForce<'w> {
             return Some(format!("the hit is {distance} steps from the triangle it names, {allowed} are allowed"));
         }
         let (face, sub) = mesh.surface().face_of(patch.id);
-        let normal = triangle.normal().normalize_or_zero();
+        // A sliver's normal is lost among the rounding errors of the products that it is the difference of.
+        let is_sliver = triangle.normal().length() < triangle.longest().powi(2) * 2f64.powi(-14);
+        let normal = if is_sliver { DVec3::ZERO } else { triangle.normal().normalize_or_zero() };
         let same_side = normal.dot(hit.normal_in_object.as_dvec3().normalize_or_zero());
         (hit.face != face || hit.sub != sub || (normal != DVec3::ZERO && same_side < 0.999)).then(|| {
             format!("face {}.{} and normal {} are not those of the triangle", hit.face, hit.sub, hit.normal_in_object)
@@ -98,7 +103,8 @@ impl<'w> BruteForce<'w> {
                     let view = triangle.seen_by(&seen);
                     let doubt = (view.uncertainty + seen.rounding(view.t)) / seen.direction.length();
                     let nearer = view.t > doubt && view.t + doubt < f64::from(t);
-                    view.inside > SLACK && nearer && ray.from != Some(name(id, patch.id, k))
+                    let is_there = || !mesh.surface().edited().hide_cell(patch.id, &patch.rates, k as u32 / 2);
+                    view.inside > SLACK && nearer && ray.from != Some(name(id, patch.id, k)) && is_there()
                 })?;
                 Some(format!("mesh {id}, patch {}, triangle {k} is before t = {t} and was not hit", patch.id))
             })
@@ -156,14 +162,18 @@ impl Triangle {
         (q - p).cross(r - p)
     }
 
+    fn longest(&self) -> f64 {
+        let [p, q, r] = self.0;
+        (q - p).length().max((r - q).length()).max((p - r).length())
+    }
+
     fn seen_by(&self, ray: &LatticeRay) -> View {
         let along = ray.direction.normalize();
         let from_ray = self.0.map(|p| (p - ray.origin).reject_from_normalized(along));
         let edge = |i: usize| from_ray[(i + 1) % 3] - from_ray[i];
         let area = edge(0).cross(edge(1)).dot(along);
         let beside = |i: usize| area.signum() * from_ray[i].cross(edge(i)).dot(along) / edge(i).length();
-        let [p, q, r] = self.0;
-        let longest = (q - p).length().max((r - q).length()).max((p - r).length());
+        let (p, longest) = (self.0[0], self.longest());
         // A triangle seen from its edge: sideways errors become long along the ray, but never longer than the triangle.
         let steepness = longest * longest / area.abs();
         let uncertainty = ((SLACK + longest * 2f64.powi(-22)) * steepness).min(longest) + SLACK;

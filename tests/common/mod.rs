@@ -3,6 +3,7 @@
 
 pub mod brute_force;
 pub mod limit_table;
+pub mod random;
 pub mod traced;
 
 use std::path::PathBuf;

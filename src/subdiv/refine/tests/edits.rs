@@ -5,12 +5,12 @@ use super::assert_local_is_whole;
 use crate::ids::VertexId;
 use crate::mesh::{Crease, Edit, EditKind, EditValue, shapes};
 
-fn edit(kind: EditKind, path: &[u32], value: EditValue) -> Edit {
+pub(crate) fn edit(kind: EditKind, path: &[u32], value: EditValue) -> Edit {
     Edit { kind, path: path.to_vec(), value }
 }
 
 /// A cube with a bump at level 2, a moved control vertex, sharp edges at level 1, a sharp vertex and a hole.
-fn edited_cube() -> ControlMesh {
+pub(crate) fn edited_cube() -> ControlMesh {
     let corner = |i: u32| 2.0 * DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64) - 1.0;
     let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let mut mesh = ControlMesh::from_polygons((0..8).map(corner).collect(), &sides.map(|f| f.to_vec())).unwrap();
@@ -26,7 +26,7 @@ fn edited_cube() -> ControlMesh {
 }
 
 /// A tetrahedron with an edge of sharpness 3 and edits whose first child is that of a triangle.
-fn edited_tetrahedron() -> ControlMesh {
+pub(crate) fn edited_tetrahedron() -> ControlMesh {
     let positions = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
     let mut mesh = ControlMesh::from_polygons(
         positions.map(DVec3::from).to_vec(),

@@ -1,6 +1,6 @@
 //! Values known in closed form, and whole against local refinement; the large table is in `tests/limit_points.rs`.
 
-mod edits;
+pub(crate) mod edits;
 
 use super::*;
 use crate::ids::VertexId;

@@ -1,0 +1,80 @@
+//! Evaluating patches under edits: down the quadtree, then as any plan.
+
+use super::EditTree;
+use crate::math::DBounds;
+use crate::subdiv::eval::{Evaluator, Point, SurfaceSample, Target, half_range, quarter};
+use crate::subdiv::plan::PlanLibrary;
+
+impl Evaluator {
+    /// As [`grid`](Self::grid) for a patch under edits.
+    pub fn edited_grid(
+        &mut self,
+        library: &PlanLibrary,
+        tree: &EditTree,
+        us: impl IntoIterator<Item = f64>,
+        vs: impl IntoIterator<Item = f64>,
+        out: &mut [Point],
+    ) {
+        let target = self.start_grid(us, vs);
+        self.walk_tree(library, tree, 0, target, out);
+    }
+
+    fn walk_tree(&mut self, library: &PlanLibrary, tree: &EditTree, depth: u32, target: Target, out: &mut [Point]) {
+        match tree {
+            EditTree::Rest { node, ring } => {
+                let ring = self.start_ring(ring);
+                self.walk(library, *node, ring, depth, target, out);
+            }
+            EditTree::Split(quarters) => {
+                let middle = self.middle(&target);
+                for (k, tree) in quarters.iter().enumerate() {
+                    let mark = self.n_params();
+                    if let Some(part) = self.quarter_target(&target, middle, k) {
+                        self.walk_tree(library, tree, depth + 1, part, out);
+                        self.truncate_params(mark);
+                    }
+                }
+            }
+        }
+    }
+
+    /// As [`sample`](Self::sample) for a patch under edits.
+    pub fn edited_sample(&mut self, library: &PlanLibrary, tree: &EditTree, u: f64, v: f64) -> SurfaceSample {
+        let (mut tree, mut u, mut v, mut depth) = (tree, u, v, 0);
+        loop {
+            match tree {
+                EditTree::Rest { node, ring } => return self.sample_part(library, *node, ring, [u, v], depth),
+                EditTree::Split(quarters) => {
+                    let k = usize::from(u >= 0.5) ^ if v >= 0.5 { 3 } else { 0 };
+                    let (x, y) = quarter(k);
+                    (tree, u, v) = (&quarters[k], 2.0 * u - x, 2.0 * v - y);
+                    depth += 1;
+                }
+            }
+        }
+    }
+
+    /// As [`bounds`](Self::bounds) for a patch under edits.
+    pub fn edited_bounds(
+        &mut self,
+        library: &PlanLibrary,
+        tree: &EditTree,
+        u: [f64; 2],
+        v: [f64; 2],
+        depth: u32,
+    ) -> DBounds {
+        match tree {
+            EditTree::Rest { node, ring } => self.bounds(library, *node, ring, u, v, depth),
+            EditTree::Split(quarters) => {
+                let mut bounds = DBounds::EMPTY;
+                for (k, tree) in quarters.iter().enumerate() {
+                    let (x, y) = quarter(k);
+                    if let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) {
+                        bounds = bounds.union(self.edited_bounds(library, tree, u, v, depth.saturating_sub(1)));
+                    }
+                }
+                bounds
+            }
+        }
+    }
+}
