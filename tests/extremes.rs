@@ -60,7 +60,7 @@ fn a_thousand_faces_at_a_vertex_and_a_thousand_sides_of_a_face() {
     for (name, mesh) in
         [("globe", shapes::globe(1000, 3)), ("prism", shapes::prism(1000)), ("pole", shapes::pole(1000))]
     {
-        assert!(assert_tight(name, &mesh, DicingRate::Fixed(4), DAffine3::IDENTITY, 20_000) > 10_000, "{name}");
+        assert!(assert_tight(name, &mesh, DicingRate::Fixed(4), DAffine3::IDENTITY, 2_000) > 1_000, "{name}");
     }
     let disc = Traced::new(&shapes::n_gon(1000), DAffine3::IDENTITY, DicingRate::Fixed(2));
     let hit = disc.tracer().closest(&Ray::new(DVec3::new(0.1, 5.0, 0.2), DVec3::NEG_Y));
