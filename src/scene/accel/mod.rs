@@ -72,6 +72,7 @@ const _: () = assert!(size_of::<WideNode>() == 224);
 /// let ray = LatticeRay::new(DVec3::new(-50.0, 50.0, 50.0), DVec3::X, f32::INFINITY, TriangleId::NONE);
 /// let mut order = vec![];
 /// tree.closest(Portable, &ray, &mut TraversalStack::default(), |leaf, _t_max| order.push(leaf.patch.idx()));
+/// order.sort();
 /// assert_eq!(order, (0..100).collect::<Vec<_>>());
 /// ```
 #[derive(Clone, Debug)]
