@@ -4,7 +4,7 @@
 //! `LAZYTESS_STRESS_SECONDS` if that is set.
 
 use lazytess::cache::{
-    Block, BlockLayout, CacheConfig, CacheStatistics, Claim, SegmentCache, Slot, SlotId, SlotTable, Visit,
+    Block, BlockLayout, CacheConfig, CacheStatistics, Claim, Reinsert, SegmentCache, Slot, SlotId, SlotTable, Visit,
 };
 use std::time::{Duration, Instant};
 
@@ -18,7 +18,7 @@ struct Stress {
 }
 
 impl Stress {
-    fn new(bytes: usize, reinsert: bool) -> Self {
+    fn new(bytes: usize, reinsert: Reinsert) -> Self {
         let cache = SegmentCache::new(CacheConfig { reinsert, ..CacheConfig::with_bytes(bytes) }).unwrap();
         let table = cache.table(N_SLOTS as usize);
         Self { cache, table, until: Instant::now() + time_for_one() }
@@ -89,7 +89,7 @@ fn check(block: &Block<'_>, id: u32) {
 }
 
 /// Runs the threads and returns visits of the slowest thread and all counters.
-fn stress(n_threads: u32, bytes: usize, reinsert: bool) -> (u64, CacheStatistics) {
+fn stress(n_threads: u32, bytes: usize, reinsert: Reinsert) -> (u64, CacheStatistics) {
     let stress = Stress::new(bytes, reinsert);
     let slowest = std::thread::scope(|scope| {
         let threads: Vec<_> = (0..n_threads)
@@ -103,15 +103,18 @@ fn stress(n_threads: u32, bytes: usize, reinsert: bool) -> (u64, CacheStatistics
         threads.into_iter().map(|thread| thread.join().expect("every block held its own id")).min()
     });
     let statistics = stress.cache.statistics();
-    println!("{n_threads} threads, {bytes} bytes, reinsert {reinsert}: slowest {slowest:?} visits, {statistics:#?}");
+    println!("{n_threads} threads, {bytes} bytes, reinsert {reinsert:?}: slowest {slowest:?} visits, {statistics:#?}");
     (slowest.unwrap_or(0), statistics)
 }
 
 #[test]
 fn every_block_holds_its_own_id_and_no_thread_is_stuck() {
-    for (n_threads, bytes, reinsert) in
-        [(2, 4 << 10, false), (16, 20 << 10, true), (64, 20 << 10, false), (64, 600 << 10, true)]
-    {
+    for (n_threads, bytes, reinsert) in [
+        (2, 4 << 10, Reinsert::Never),
+        (16, 20 << 10, Reinsert::All),
+        (64, 20 << 10, Reinsert::Never),
+        (64, 600 << 10, Reinsert::Parents),
+    ] {
         let (slowest, statistics) = stress(n_threads, bytes, reinsert);
         assert!(slowest > 0 && statistics.hits > 0 && statistics.peak_bytes <= bytes as u64);
         assert_eq!(statistics.lookups, statistics.hits + statistics.misses());

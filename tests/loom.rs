@@ -7,8 +7,8 @@
 #![cfg(loom)]
 
 use lazytess::cache::{
-    Block, BlockLayout, CacheConfig, CacheStatistics, Capacity, Claim, Pin, SegmentCache, Slot, SlotId, SlotTable,
-    Visit,
+    Block, BlockLayout, CacheConfig, CacheStatistics, Capacity, Claim, Pin, Reinsert, SegmentCache, Slot, SlotId,
+    SlotTable, Visit,
 };
 use loom::thread;
 use std::sync::Arc;
@@ -23,10 +23,10 @@ struct Toy {
 
 impl Toy {
     fn new(segments: usize, lines: usize, n_slots: usize) -> Arc<Self> {
-        Self::with(segments, lines, n_slots, false)
+        Self::with(segments, lines, n_slots, Reinsert::Never)
     }
 
-    fn with(segments: usize, lines: usize, n_slots: usize, reinsert: bool) -> Arc<Self> {
+    fn with(segments: usize, lines: usize, n_slots: usize, reinsert: Reinsert) -> Arc<Self> {
         let capacity = Capacity::Bytes(segments * lines * LINE);
         let config = CacheConfig { capacity, segments: Some(segments), max_threads: 4, reinsert };
         let cache = SegmentCache::new(config).unwrap();
@@ -153,7 +153,7 @@ fn child_words_are_not_mistaken_for_bytes_nor_the_other_way_round() {
 #[test]
 fn a_block_is_copied_while_another_thread_reads_and_fills_it() {
     explore(Some(2), || {
-        let toy = Toy::with(4, 2, 4, true);
+        let toy = Toy::with(4, 2, 4, Reinsert::All);
         let mut pin = toy.cache.pin();
         (0..3).for_each(|root| toy.family(&mut pin, root));
         pin.release();

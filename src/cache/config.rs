@@ -31,14 +31,26 @@ pub struct CacheConfig {
     pub segments: Option<usize>,
     /// Pins that can use the cache at the same time. Pins beyond build every block for themselves.
     pub max_threads: usize,
-    /// Whether a block that is hit shortly before it would be recycled is copied to the current segment.
-    pub reinsert: bool,
+    /// Which blocks that are hit shortly before they would be recycled are copied to the current segment.
+    pub reinsert: Reinsert,
+}
+
+/// Blocks that stay as long as they are used, like the second chance of a page.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Reinsert {
+    /// None: the ring is a plain queue.
+    Never,
+    /// Blocks with child slots. Where they lie among the oldest, all that was built below them is lost with them, though
+    /// it is younger.
+    Parents,
+    /// All.
+    All,
 }
 
 impl CacheConfig {
     /// A cache of `bytes` with everything else as it should be for most.
     pub fn with_bytes(bytes: usize) -> Self {
-        Self { capacity: Capacity::Bytes(bytes), segments: None, max_threads: 256, reinsert: false }
+        Self { capacity: Capacity::Bytes(bytes), segments: None, max_threads: 256, reinsert: Reinsert::Parents }
     }
 
     /// A cache that grows up to `at_most` bytes.

@@ -53,6 +53,11 @@
 //! or later. Any number of threads may try at once. If a pin lags behind, or if the block is larger than a segment, the
 //! block is built in private memory of the visit and used once: a **bypass**. Blocks below it are bypassed, too.
 //!
+//! A thread that the system puts to sleep in the middle of a visit pins a segment until it runs again, which with more
+//! threads than processors is soon the state of them all. So a thread that was bypassed because of a pin gives up its
+//! processor at the end of its visit, with its own pin released: the sleepers end their visits one after the other, and
+//! from then on threads mostly sleep between visits.
+//!
 //! Nobody ever waits. There is no lock on any of these ways, each loop is left after a bounded number of rounds, and
 //! the cost of bad luck is a block built twice, which is counted.
 //!
@@ -109,7 +114,7 @@ mod trace;
 mod word;
 
 pub use block::{Block, BlockLayout};
-pub use config::{CacheConfig, Capacity};
+pub use config::{CacheConfig, Capacity, Reinsert};
 pub use pin::{Pin, Visit};
 pub use replay::{Policy, Replay, Replayed};
 pub use slot::{Slot, SlotId, SlotTable};
@@ -131,7 +136,7 @@ pub struct SegmentCache {
     tag: CacheTag,
     /// Child words of all blocks that are used once: nobody ever writes them.
     private_words: Box<[AtomicU64]>,
-    reinsert: bool,
+    reinsert: Reinsert,
     totals: Mutex<CacheStatistics>,
 }
 

@@ -3,13 +3,15 @@
 
 use super::SegmentCache;
 use super::block::Block;
+use super::config::Reinsert;
 use super::scratch::Scratch;
 use super::segment::Ring;
 use super::slot::{Slot, SlotId, SlotTable};
 use super::stats::{CacheStatistics, Counters, count};
-use super::sync::{AtomicU64, AtomicUsize, Ordering, fence};
-use super::word::{Place, first_word_of, without_builder};
+use super::sync::{AtomicU64, AtomicUsize, Ordering, fence, yield_now};
+use super::word::{Place, WORD_LINES_MASK, first_word_of, without_builder};
 use crossbeam::utils::CachePadded;
+use std::cell::Cell;
 use std::marker::PhantomData;
 
 /// The value of a pin word that belongs to no thread.
@@ -66,8 +68,12 @@ pub struct Pin<'c> {
     age: u64,
     /// Slot words from here on are blocks that this pin can read.
     first_readable: u64,
-    /// Slot words below are blocks that a hit copies to the current segment.
+    /// Slot words below are blocks that a hit copies to the current segment, if `kept_bits` says so.
     first_kept: u64,
+    /// Bits of a slot word of which one is set in those blocks.
+    kept_bits: u64,
+    /// Whether a block of the last visit found no place because of another pin.
+    pub(super) met_a_pin: Cell<bool>,
     pub(super) scratch: Scratch,
     pub(super) counters: Counters,
     not_send: PhantomData<*const ()>,
@@ -81,6 +87,12 @@ impl<'c> Pin<'c> {
             age: UNPINNED,
             first_readable: u64::MAX,
             first_kept: 0,
+            kept_bits: match cache.reinsert {
+                Reinsert::Never => 0,
+                Reinsert::Parents => WORD_LINES_MASK,
+                Reinsert::All => u64::MAX,
+            },
+            met_a_pin: Cell::new(false),
             scratch: Scratch::default(),
             counters: Counters::default(),
             not_send: PhantomData,
@@ -91,7 +103,9 @@ impl<'c> Pin<'c> {
     /// recycled since the last visit.
     #[inline]
     pub fn visit(&mut self) -> Visit<'_> {
-        self.scratch.clear();
+        if self.scratch.is_used() {
+            self.end_private_blocks();
+        }
         if self.cache.ring.head() != self.age {
             self.move_to_head();
         }
@@ -114,6 +128,18 @@ impl<'c> Pin<'c> {
         self.counters.statistics()
     }
 
+    /// Forgets the blocks that were built for the last visit. If some of them found no place because of another pin, that
+    /// pin's thread is probably asleep within its visit, and what it needs is a processor. So this thread steps aside, and does so between two visits, with its own pin released: then a
+    /// thread that does not run holds nothing. It does not wait for anything.
+    #[cold]
+    fn end_private_blocks(&mut self) {
+        self.scratch.clear();
+        if self.met_a_pin.take() {
+            self.release();
+            yield_now();
+        }
+    }
+
     /// Announces the head's age and makes sure that the announcement was in time (invariant 4). Each further round means
     /// that the head has moved, and once a recycler has seen the pin the head can move only a few segments more.
     #[cold]
@@ -134,7 +160,7 @@ impl<'c> Pin<'c> {
         }
         self.age = age;
         self.first_readable = first_word_of(ring.oldest_readable(age));
-        self.first_kept = if self.cache.reinsert { first_word_of(ring.oldest_kept(age)) } else { 0 };
+        self.first_kept = first_word_of(ring.oldest_kept(age));
     }
 }
 
@@ -178,8 +204,9 @@ impl<'p> Visit<'p> {
             return None;
         }
         count(&self.pin.counters.hits);
+        let is_old = seen < self.pin.first_kept && seen & self.pin.kept_bits != 0;
         // SAFETY: just seen with `Acquire` and readable.
-        Some(if seen < self.pin.first_kept { self.reinsert(word, seen) } else { unsafe { self.block(seen) } })
+        Some(if is_old { self.reinsert(word, seen) } else { unsafe { self.block(seen) } })
     }
 
     /// Hints that the block of a slot will be asked for soon.

@@ -5,7 +5,7 @@
 //! Two caches that nobody can build so cheaply show what there is to gain: least recently used, and Belady's, which
 //! knows the future. Both keep single blocks without gaps and never lose a child with its parent.
 
-use super::config::RingShape;
+use super::config::{Reinsert, RingShape};
 use super::memory::LINE;
 use super::trace::TraceLog;
 use rustc_hash::FxHashMap;
@@ -19,7 +19,7 @@ pub enum Policy {
         /// As in [`CacheConfig::segments`](super::CacheConfig::segments).
         segments: Option<usize>,
         /// As in [`CacheConfig::reinsert`](super::CacheConfig::reinsert).
-        reinsert: bool,
+        reinsert: Reinsert,
     },
     /// The block that was not asked for the longest goes first.
     LeastRecentlyUsed,
@@ -66,13 +66,20 @@ pub struct Replay {
     steps: Vec<Step>,
     /// Lines of each block.
     lines: Vec<u16>,
+    /// Whether blocks below it were asked for.
+    is_parent: Vec<bool>,
     share: f64,
 }
 
 impl Replay {
     /// Numbers the blocks of a trace.
     pub fn new(trace: &TraceLog) -> Self {
-        let mut replay = Self { steps: Vec::with_capacity(trace.len()), lines: Vec::new(), share: trace.share() };
+        let mut replay = Self {
+            steps: Vec::with_capacity(trace.len()),
+            lines: Vec::new(),
+            is_parent: Vec::new(),
+            share: trace.share(),
+        };
         let mut numbers: FxHashMap<u64, u32> = FxHashMap::default();
         let mut path = [NONE; 8];
         trace.with_accesses(|accesses| {
@@ -81,8 +88,12 @@ impl Replay {
                 let block = *numbers.entry(access.key()).or_insert(next);
                 if block == next {
                     replay.lines.push(access.lines() as u16);
+                    replay.is_parent.push(false);
                 }
                 let parent = if access.level() == 0 { NONE } else { path[access.level() - 1] };
+                if let Some(is_parent) = replay.is_parent.get_mut(parent as usize) {
+                    *is_parent = true;
+                }
                 path[access.level()] = block;
                 replay.steps.push(Step { block, parent });
             }
@@ -122,7 +133,7 @@ impl Replay {
         counts
     }
 
-    fn segments(&self, shape: RingShape, reinsert: bool) -> Replayed {
+    fn segments(&self, shape: RingShape, reinsert: Reinsert) -> Replayed {
         let mut ring = Ring::new(shape, self.share);
         let mut states = vec![State::default(); self.lines.len()];
         self.replay(|_, Step { block, parent }| {
@@ -132,7 +143,12 @@ impl Replay {
             };
             let (state, lines) = (&mut states[block as usize], self.lines[block as usize]);
             if state.age >= ring.oldest_readable() && state.parent_build == parent_build && !is_private {
-                if reinsert && state.age < ring.oldest_kept() {
+                let is_kept = match reinsert {
+                    Reinsert::Never => false,
+                    Reinsert::Parents => self.is_parent[block as usize],
+                    Reinsert::All => true,
+                };
+                if is_kept && state.age < ring.oldest_kept() {
                     state.age = ring.reserve(lines).unwrap_or(state.age);
                 }
                 return true;

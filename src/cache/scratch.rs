@@ -47,16 +47,14 @@ impl Scratch {
         unsafe { std::slice::from_raw_parts_mut(chunks[self.current.get()].memory.line(first), lines * LINE) }
     }
 
-    /// Forgets all blocks. Keeps a little memory for the next visit.
+    /// Whether there are blocks.
     #[inline(always)]
-    pub(super) fn clear(&mut self) {
-        if self.used.get() != 0 {
-            self.empty();
-        }
+    pub(super) fn is_used(&self) -> bool {
+        self.used.get() != 0
     }
 
-    #[cold]
-    fn empty(&mut self) {
+    /// Forgets all blocks. Keeps a little memory for the next visit.
+    pub(super) fn clear(&mut self) {
         let mut kept = 0;
         self.chunks.get_mut().retain(|chunk| {
             kept += usize::from(chunk.lines == CHUNK_LINES);

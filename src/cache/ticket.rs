@@ -178,6 +178,7 @@ impl<'v> Ticket<'v> {
             NoPlace::TooLarge => &self.counters().bypassed_too_large,
             NoPlace::Pinned => &self.counters().bypassed_pinned,
         });
+        self.visit.pin.met_a_pin.set(why == NoPlace::Pinned || self.visit.pin.met_a_pin.get());
         let block = self.visit.private_block(layout, encode);
         self.end_build(false);
         self.give_back(|_| EVICTED);

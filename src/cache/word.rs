@@ -29,6 +29,9 @@ pub(super) const WORDS_PER_LINE: usize = LINE / 8;
 /// Lines of child words that a block can have.
 pub(super) const MAX_WORD_LINES: usize = (1 << WORD_LINES_BITS) - 1;
 
+/// The bits of a slot word that are set only if the block has child slots.
+pub(super) const WORD_LINES_MASK: u64 = MAX_WORD_LINES as u64;
+
 /// Nobody has built this block yet.
 pub(super) const EMPTY: u64 = 0;
 /// This block was built before and is gone, or was used once.

@@ -13,7 +13,7 @@ use crate::io::write::write_whole;
 use crate::render::workers::Rendered;
 use crate::render::{Aov, RenderSettings};
 use crate::report::{
-    CacheReport, GeometryReport, GroupReport, MemoryReport, PictureReport, RayReport, RenderStatistics,
+    CacheReport, CostReport, GeometryReport, GroupReport, MemoryReport, PictureReport, RayReport, RenderStatistics,
 };
 use crate::scene::description::SceneDescription;
 use crate::scene::world::GridCache;
@@ -222,6 +222,7 @@ impl RenderJob {
                 full_bytes: full.bytes,
             },
             cache: CacheReport::new(capacity, &cache.segments().statistics()),
+            costs: CostReport::new(&prepared.world, &cache.costs()),
             memory: MemoryReport { budget_bytes: self.memory, peak_resident_bytes: None },
             seconds: prepared.seconds,
         }

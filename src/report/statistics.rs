@@ -2,6 +2,8 @@
 
 use crate::cache::CacheStatistics;
 use crate::render::{PixelCounts, RayCounts, RenderSettings, Rendered};
+use crate::scene::costs::BuildCosts;
+use crate::scene::world::World;
 use serde::Serialize;
 
 /// Everything counted and timed during one render.
@@ -23,6 +25,8 @@ pub struct RenderStatistics {
     pub geometry: GeometryReport,
     /// The tessellation cache.
     pub cache: CacheReport,
+    /// Where blocks were built.
+    pub costs: CostReport,
     /// Memory of the process.
     pub memory: MemoryReport,
     /// Time by phase.
@@ -130,6 +134,14 @@ pub struct CacheReport {
     pub other_misses: u64,
     /// Blocks built and used once, because they could not be kept.
     pub bypasses: u64,
+    /// Those of them that found no place because a thread was still reading the oldest segment.
+    pub bypasses_pinned: u64,
+    /// Blocks that two threads built at the same time, so that one was thrown away. Threads never wait for each other.
+    pub duplicate_builds: u64,
+    /// Seconds that these cost, summed over threads.
+    pub duplicate_seconds: f64,
+    /// Blocks copied to a younger segment because they were still used.
+    pub reinsertions: u64,
     /// Bytes of all blocks built.
     pub bytes_built: u64,
     /// Seconds spent building, summed over threads; estimated from a sample.
@@ -152,11 +164,62 @@ impl CacheReport {
             capacity_misses: counters.capacity_misses,
             other_misses: counters.misses() - counters.compulsory_misses - counters.capacity_misses,
             bypasses: counters.bypasses(),
+            bypasses_pinned: counters.bypassed_pinned,
+            duplicate_builds: counters.builds_discarded,
+            duplicate_seconds: counters.time_lost.as_secs_f64(),
+            reinsertions: counters.reinsertions,
             bytes_built: counters.bytes_built,
             build_seconds: counters.build_time.as_secs_f64(),
             segments_recycled: counters.segments_recycled,
             peak_bytes: counters.peak_bytes,
         }
+    }
+}
+
+/// The meshes and patches that most blocks were built for, most first; at most ten of each.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct CostReport {
+    /// Meshes.
+    pub meshes: Vec<MeshCost>,
+    /// Patches. Where very many patches were built, their numbers may be a little low.
+    pub patches: Vec<FaceCost>,
+}
+
+/// Blocks built for a mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct MeshCost {
+    /// Its place in the scene file, from 0.
+    pub mesh: u32,
+    /// Blocks built, rebuilt ones counted again.
+    pub blocks: u64,
+}
+
+/// Blocks built for a patch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct FaceCost {
+    /// Its mesh's place in the scene file, from 0.
+    pub mesh: u32,
+    /// Its face's place in the mesh file, from 0.
+    pub face: u32,
+    /// Which sub-quad of the face it is; 0 for a quad.
+    pub sub: u32,
+    /// Blocks built, rebuilt ones counted again.
+    pub blocks: u64,
+}
+
+impl CostReport {
+    /// Entries of each list.
+    const MOST: usize = 10;
+
+    /// The costliest meshes and patches of `world`.
+    pub fn new(world: &World, costs: &BuildCosts) -> Self {
+        let meshes =
+            costs.costliest_meshes(Self::MOST).into_iter().map(|(mesh, blocks)| MeshCost { mesh: mesh.0, blocks });
+        let patches = costs.costliest_patches(Self::MOST).into_iter().map(|cost| {
+            let (face, sub) = world.mesh(cost.mesh).surface().face_of(cost.patch);
+            FaceCost { mesh: cost.mesh.0, face: face.0, sub, blocks: cost.blocks }
+        });
+        Self { meshes: meshes.collect(), patches: patches.collect() }
     }
 }
 

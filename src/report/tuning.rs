@@ -1,7 +1,7 @@
 //! How large the cache should be: hit rate and time against size, replayed from the trace of one render.
 
 use super::quantity::{Bytes, Count};
-use crate::cache::{CacheStatistics, Policy, Replay, TraceLog};
+use crate::cache::{CacheStatistics, Policy, Reinsert, Replay, TraceLog};
 use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -41,8 +41,10 @@ pub struct CurvePoint {
     pub seconds: f64,
     /// Blocks built again.
     pub rebuilds: u64,
-    /// Blocks that would be built again if blocks in use were copied before they are recycled.
-    pub rebuilds_with_reinsertion: u64,
+    /// Blocks that would be built again if nothing were copied before it is recycled.
+    pub rebuilds_without_reinsertion: u64,
+    /// Blocks that would be built again if all blocks in use were copied before they are recycled, not only parents.
+    pub rebuilds_reinserting_all: u64,
     /// Blocks that a cache that drops what was unused longest would build again.
     pub rebuilds_least_recently_used: u64,
     /// Blocks that a cache that knows the future would build again.
@@ -97,7 +99,8 @@ impl TimeModel {
     }
 }
 
-const AS_BUILT: Policy = Policy::Segments { segments: None, reinsert: false };
+/// The cache as [`CacheConfig::with_bytes`](crate::cache::CacheConfig::with_bytes) makes it.
+const AS_BUILT: Policy = Policy::Segments { segments: None, reinsert: Reinsert::Parents };
 
 impl Tuning {
     /// Replays the render for many sizes, on as many threads as it had.
@@ -169,7 +172,8 @@ fn point(replay: &Replay, bytes: usize, lookups: u64, time: &TimeModel) -> Curve
         hit_rate: as_built.hit_rate(),
         seconds: time.seconds(as_built.hit_rate()),
         rebuilds: (as_built.rebuild_rate() * lookups as f64) as u64,
-        rebuilds_with_reinsertion: rebuilds(Policy::Segments { segments: None, reinsert: true }),
+        rebuilds_without_reinsertion: rebuilds(Policy::Segments { segments: None, reinsert: Reinsert::Never }),
+        rebuilds_reinserting_all: rebuilds(Policy::Segments { segments: None, reinsert: Reinsert::All }),
         rebuilds_least_recently_used: rebuilds(Policy::LeastRecentlyUsed),
         rebuilds_belady: rebuilds(Policy::Belady),
     }
@@ -201,7 +205,8 @@ fn knee(curve: &[CurvePoint]) -> u64 {
 }
 
 fn best_segments(replay: &Replay, bytes: usize) -> (usize, f64) {
-    let rates = SEGMENT_COUNTS.map(|n| (n, replay.run(Policy::Segments { segments: Some(n), reinsert: false }, bytes)));
+    let rates = SEGMENT_COUNTS
+        .map(|n| (n, replay.run(Policy::Segments { segments: Some(n), reinsert: Reinsert::Parents }, bytes)));
     let rates = rates.map(|(n, replayed)| (n, replayed.hit_rate()));
     rates.into_iter().rev().max_by(|a, b| a.1.total_cmp(&b.1)).expect("several counts are compared")
 }
@@ -228,12 +233,12 @@ impl Display for Tuning {
             self.recorded_seconds,
             1e6 * self.build_seconds
         )?;
-        writeln!(f, "     cache  hit rate   seconds      rebuilt  reinserting          LRU       Belady")?;
+        writeln!(f, "     cache  hit rate   seconds      rebuilt   plain FIFO  keeping all          LRU       Belady")?;
         for p in &self.curve {
-            let [a, b, c, d] =
-                [p.rebuilds, p.rebuilds_with_reinsertion, p.rebuilds_least_recently_used, p.rebuilds_belady];
+            let [a, b, c] = [p.rebuilds, p.rebuilds_without_reinsertion, p.rebuilds_reinserting_all];
+            let [d, e] = [p.rebuilds_least_recently_used, p.rebuilds_belady];
             let size = Bytes(p.cache_bytes).to_string();
-            writeln!(f, "{size:>10}  {:8.4}  {:8.2}  {a:11}  {b:11}  {c:11}  {d:11}", p.hit_rate, p.seconds)?;
+            writeln!(f, "{size:>10}  {:8.4}  {:8.2}  {a:11}  {b:11}  {c:11}  {d:11}  {e:11}", p.hit_rate, p.seconds)?;
         }
         writeln!(f, "\nworking set       {}", Bytes(self.working_set_bytes))?;
         writeln!(f, "knee              {}", Bytes(self.knee_bytes))?;

@@ -5,6 +5,7 @@
 //! spot, so nothing is tessellated but what a ray reaches.
 
 use super::accel::TraversalStack;
+use super::costs::BuildCosts;
 use super::world::{GridCache, World, WorldMesh};
 use crate::cache::{Block, BlockLayout, Claim, Pin, Recorder, Slot, SlotId, TraceLog, Visit};
 use crate::grid::{
@@ -44,6 +45,7 @@ struct Builder<'w> {
     n_built: u64,
     n_pieces: u64,
     n_triangles: u64,
+    costs: BuildCosts,
     /// Notes every block that is asked for, if the cache wants to know.
     recorder: Option<Recorder<'w>>,
 }
@@ -138,6 +140,7 @@ impl Builder<'_> {
             Claim::Build(ticket) => ticket,
         };
         self.n_built += 1;
+        self.costs.add(of.id, of.patch, 1);
         if self.mesh.replace(of.id) != Some(of.id) {
             self.dicer.forget();
         }
@@ -466,7 +469,8 @@ fn triangle_id(world: &World, of: &PrimitiveRef) -> TriangleId {
 
 impl Drop for Intersector<'_> {
     fn drop(&mut self) {
-        self.cache.add_built(self.builder.n_pieces, self.builder.n_triangles);
+        let costs = std::mem::take(&mut self.builder.costs);
+        self.cache.add_built(self.builder.n_pieces, self.builder.n_triangles, costs);
     }
 }
 

@@ -5,6 +5,7 @@
 pub mod accel;
 pub mod camera;
 pub mod compile;
+pub mod costs;
 pub mod description;
 pub mod intersect;
 pub mod light;

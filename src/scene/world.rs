@@ -1,6 +1,7 @@
 //! Everything about the scene's geometry that stays the same during a render.
 
 use super::accel::{BUILD_BYTES_PER_PATCH, TopLevel};
+use super::costs::BuildCosts;
 use super::description::MeshDescription;
 use super::rate::DicingRate;
 use crate::cache::{CacheConfig, SegmentCache, SlotTable, TraceLog};
@@ -12,6 +13,7 @@ use crate::mesh::{ControlMesh, TexCoords};
 use crate::subdiv::dice::LATTICE_SHIFT;
 use crate::subdiv::{Dicer, PatchRates, Surface};
 use glam::{DAffine3, DMat3, DVec3};
+use parking_lot::Mutex;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// Quarters of an irregular patch that its box looks into: more make the box tighter, and building slower.
@@ -380,6 +382,7 @@ pub struct GridCache {
     touched: Vec<Box<[AtomicU64]>>,
     triangles_built: AtomicU64,
     pieces_built: AtomicU64,
+    costs: Mutex<BuildCosts>,
     trace: Option<TraceLog>,
 }
 
@@ -395,6 +398,7 @@ impl GridCache {
             touched: n_slots().map(bits).collect(),
             triangles_built: AtomicU64::new(0),
             pieces_built: AtomicU64::new(0),
+            costs: Mutex::default(),
             trace: None,
             segments,
         })
@@ -429,9 +433,15 @@ impl GridCache {
         }
     }
 
-    pub(super) fn add_built(&self, pieces: u64, triangles: u64) {
+    pub(super) fn add_built(&self, pieces: u64, triangles: u64, costs: BuildCosts) {
+        self.costs.lock().merge(costs);
         self.pieces_built.fetch_add(pieces, Ordering::Relaxed);
         self.triangles_built.fetch_add(triangles, Ordering::Relaxed);
+    }
+
+    /// Blocks built by tracers that have ended, by mesh and patch.
+    pub fn costs(&self) -> BuildCosts {
+        self.costs.lock().clone()
     }
 
     /// Triangles of all pieces that tracers built until they ended, rebuilt ones counted again.

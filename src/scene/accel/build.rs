@@ -15,7 +15,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use std::time::Duration;
 
 /// Memory that [`TopLevel::build`] takes while it runs, at most, for each patch; what stays is [`TopLevel::bytes`].
-pub const BUILD_BYTES_PER_PATCH: usize = 512;
+pub const BUILD_BYTES_PER_PATCH: usize = 256;
 
 /// How far a box is moved at most to either side, as twice the share of its size: enough to break ties, too little to change clusters.
 const JITTER: f32 = 0.02;
