@@ -20,7 +20,7 @@
 //! Ke, "Feature Adaptive Ray Tracing of Subdivision Surfaces", 2017, chapter 5.3 (groups); Akimoto et al., "Pixel-selected
 //! ray tracing", 1991 (refinement by prediction).
 
-use super::cells::{CELL_SIDES, Cell, CellPlace, QUAD_LEVEL, TILE_SIDE, Tile, TracedProbe};
+use super::cells::{CELL_SIDES, Cell, CellPlace, TILE_SIDE, Tile, TracedProbe};
 use super::film::{Film, FirstHit, PixelRecord};
 use super::footprint::{Claim, Footprints};
 use super::integrators::{LightMasks, Probe, Sample, Shader, Smooth, SmoothPoint};
@@ -143,10 +143,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         let watch = Instant::now();
         self.tile.reset([tile.x0, tile.y0]);
         if self.job.interpolation.is_possible() {
-            (0..QUAD_LEVEL).for_each(|level| self.refine(level));
-            if self.job.interpolation.settings.spp == 1 {
-                self.judge_quads();
-            }
+            (0..CELL_SIDES.len()).for_each(|level| self.refine(level));
         } else {
             self.split_all();
         }
@@ -170,10 +167,10 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// For integrators whose samples are random: what no patch reaches is known all the same.
     fn split_all(&mut self) {
-        for level in 0..QUAD_LEVEL {
+        for level in 0..CELL_SIDES.len() {
             for place in self.tile.cells_to_judge(level) {
                 let is_empty = self.job.footprints.is_empty(place.pixels());
-                self.tile.set_cell(&place, if is_empty { Cell::Empty } else { Cell::split(Reason::Every) });
+                self.tile.set_cell(&place, if is_empty { Cell::Empty } else { Cell::Split(Reason::Every) });
             }
         }
     }
@@ -188,20 +185,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
             };
             self.tile.set_cell(&place, cell);
         }
-        // Where pixels are antialiased, an edge may reach into a pixel beside the cell that shows it.
-        if level + 1 < QUAD_LEVEL || self.job.interpolation.settings.spp > 1 {
-            self.tile.split_beside_edges(level);
-        }
-    }
-
-    fn judge_quads(&mut self) {
-        for place in self.tile.cells_to_judge(QUAD_LEVEL) {
-            let parent = self.tile.cell(&self.tile.place(QUAD_LEVEL - 1, [place.x, place.y]));
-            let Cell::Split { reason, error } = parent else { continue };
-            let is_empty = self.job.footprints.is_empty(place.pixels());
-            let cell = if is_empty { Cell::Empty } else { self.job.judge_quad(&self.tile, &place, reason, error) };
-            self.tile.set_cell(&place, cell);
-        }
+        self.tile.split_beside_edges(level);
     }
 
     fn trace_probe(&mut self, pixel: [u32; 2]) {
@@ -228,8 +212,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
         match cell {
             Cell::Undivided | Cell::Empty => background,
             Cell::Holds { .. } => interpolation.probed(&self.tile, &place, pixel).unwrap_or(background.interpolated()),
-            Cell::Split { .. } if self.job.footprints.is_empty(single(pixel)) => background,
-            Cell::Split { reason, .. } => {
+            Cell::Split(_) if self.job.footprints.is_empty(single(pixel)) => background,
+            Cell::Split(reason) => {
                 let known = self.tile.probe(pixel).map(|p| (p.probe.sample, p.misses));
                 PixelRecord { reason, ..interpolation.pixels().trace_from(&mut self.shader, pixel, known) }
             }
@@ -261,35 +245,16 @@ impl Job<'_> {
     fn judge(&self, tile: &Tile, place: &CellPlace) -> Cell {
         let pixels = place.probe_pixels();
         let probes = pixels.map(|pixel| tile.probe(pixel).expect("all probes of a judged cell are traced").probe);
-        let Some(smooths) = all_smooth(&probes) else { return Cell::split(Reason::Silhouette) };
+        let Some(smooths) = all_smooth(&probes) else { return Cell::Split(Reason::Silhouette) };
         if let Some(reason) = first_difference(&smooths) {
-            return Cell::split(reason);
+            return Cell::Split(reason);
         }
         if !self.is_connected(place, &probes, &smooths) {
-            return Cell::split(Reason::Hidden);
+            return Cell::Split(Reason::Hidden);
         }
         let error = self.interpolation.prediction_error(place, &probes, &smooths);
         let holds = error <= self.interpolation.settings.tolerance;
-        if holds { Cell::Holds { error } } else { Cell::Split { reason: Reason::Contradiction, error } }
-    }
-
-    /// Whether a cell of 2 pixels, part of one that was split, can be interpolated between its corners. There is no probe to
-    /// contradict it: where its parent was contradicted, a quarter of the parent's error is taken for its own.
-    fn judge_quad(&self, tile: &Tile, place: &CellPlace, parent: Reason, parent_error: f32) -> Cell {
-        let pixels = place.corner_pixels();
-        let probes = pixels.map(|pixel| tile.probe(pixel).expect("all probes of the parent are traced").probe);
-        let Some(smooths) = all_smooth(&probes) else { return Cell::split(Reason::Silhouette) };
-        let error = 0.25 * parent_error;
-        // Footprints tell of silhouettes that no corner shows, but not of thin shadows, reflections and folds.
-        let is_thin = matches!(parent, Reason::Shadow | Reason::Reflection | Reason::Crease);
-        if is_thin || error > self.interpolation.settings.tolerance {
-            return Cell::Split { reason: parent, error: parent_error };
-        }
-        match first_difference(&smooths) {
-            Some(reason) => Cell::split(reason),
-            None if !self.is_connected(place, &probes, &smooths) => Cell::split(Reason::Hidden),
-            None => Cell::Holds { error },
-        }
+        if holds { Cell::Holds { error } } else { Cell::Split(Reason::Contradiction) }
     }
 
     fn is_connected<const N: usize>(&self, place: &CellPlace, probes: &[Probe; N], smooths: &[Smooth; N]) -> bool {
@@ -387,7 +352,7 @@ impl<'a> Interpolation<'a> {
     /// A pixel of a cell that holds, from the four nearest probes.
     fn pixel(&self, tile: &Tile, pixel: [u32; 2]) -> PixelRecord {
         let (place, cell) = tile.find(pixel);
-        let half = place.probe_distance();
+        let half = place.side / 2;
         let [x, y] = pixel.map(|n| n - n % half);
         let nearest = [[x, y], [x + half, y], [x + half, y + half], [x, y + half]];
         let probes = nearest.map(|p| &tile.probe(p).expect("a cell that holds has all its probes").probe);

@@ -1,8 +1,7 @@
 //! The cells that a tile is refined into, and the probes at their corners and middles.
 //!
-//! A tile of 64 x 64 pixels has cells of 16, 8, 4 and 2 pixels a side, aligned to the whole picture. A cell knows nine probes:
-//! its corners, the middles of its sides and its centre, at pixels' centres; one of 2 pixels makes do with the corners.
-//! Corners and middles on the right and at the
+//! A tile of 64 x 64 pixels has cells of 16, 8 and 4 pixels a side, aligned to the whole picture. A cell knows nine probes:
+//! its corners, the middles of its sides and its centre, at pixels' centres. Corners and middles on the right and at the
 //! bottom belong to the next cell's pixels, or the next tile's.
 
 use super::integrators::Probe;
@@ -13,10 +12,7 @@ use super::tiles::PixelRect;
 pub(super) const TILE_SIDE: u32 = 64;
 
 /// Sides of the cells of each level.
-pub(super) const CELL_SIDES: [u32; 4] = [16, 8, 4, 2];
-
-/// The level of the cells that have no middles.
-pub(super) const QUAD_LEVEL: usize = 3;
+pub(super) const CELL_SIDES: [u32; 3] = [16, 8, 4];
 
 /// Probes along a side of a tile.
 const PROBES: u32 = TILE_SIDE + 1;
@@ -30,15 +26,8 @@ pub(super) enum Cell {
     Empty,
     /// Its interpolation holds: probes differ from it by at most `error` display units.
     Holds { error: f32 },
-    /// It does not, for this reason; `error` is that of probes that contradicted the interpolation, else 0.
-    Split { reason: Reason, error: f32 },
-}
-
-impl Cell {
-    /// A cell with something in it that is not smooth.
-    pub fn split(reason: Reason) -> Self {
-        Self::Split { reason, error: 0.0 }
-    }
+    /// It does not, for this reason.
+    Split(Reason),
 }
 
 /// A traced pixel centre.
@@ -68,17 +57,6 @@ pub(super) struct CellPlace {
 impl CellPlace {
     pub fn pixels(&self) -> PixelRect {
         PixelRect { x0: self.x, y0: self.y, x1: self.x + self.side, y1: self.y + self.side }
-    }
-
-    /// Distance between its probes.
-    pub fn probe_distance(&self) -> u32 {
-        (self.side / 2).max(CELL_SIDES[QUAD_LEVEL])
-    }
-
-    /// Pixels of the probes at its corners, in the order (0,0), (1,0), (1,1), (0,1).
-    pub fn corner_pixels(&self) -> [[u32; 2]; 4] {
-        let (x1, y1) = (self.x + self.side, self.y + self.side);
-        [[self.x, self.y], [x1, self.y], [x1, y1], [self.x, y1]]
     }
 
     /// Pixels of its nine probes, row by row.
@@ -131,7 +109,7 @@ impl Tile {
         let places =
             (0..n * n).map(|k| self.place(level, [self.origin[0] + k % n * side, self.origin[1] + k / n * side]));
         places
-            .filter(|p| level == 0 || matches!(self.cell(&self.place(level - 1, [p.x, p.y])), Cell::Split { .. }))
+            .filter(|p| level == 0 || matches!(self.cell(&self.place(level - 1, [p.x, p.y])), Cell::Split(_)))
             .collect()
     }
 
@@ -152,16 +130,14 @@ impl Tile {
     /// Splits the cells of a level that hold beside one with an edge in it: the edge may go on between their probes.
     pub fn split_beside_edges(&mut self, level: usize) {
         let n = (TILE_SIDE / CELL_SIDES[level]) as usize;
-        let has_edge: Vec<bool> = self.cells[level]
-            .iter()
-            .map(|cell| matches!(cell, Cell::Split { reason, .. } if reason.is_edge()))
-            .collect();
+        let has_edge: Vec<bool> =
+            self.cells[level].iter().map(|cell| matches!(cell, Cell::Split(reason) if reason.is_edge())).collect();
         for (k, cell) in self.cells[level].iter_mut().enumerate() {
             let (x, y) = (k % n, k / n);
             let rows = y.saturating_sub(1)..(y + 2).min(n);
             let beside = |row: usize| has_edge[row * n + x.saturating_sub(1)..row * n + (x + 2).min(n)].contains(&true);
             if matches!(cell, Cell::Holds { .. }) && rows.clone().any(beside) {
-                *cell = Cell::split(Reason::Neighbour);
+                *cell = Cell::Split(Reason::Neighbour);
             }
         }
     }
@@ -192,10 +168,10 @@ mod tests {
             tile.set_cell(&place, Cell::Holds { error: 0.0 });
         }
         let edge = tile.place(0, [64, 128]);
-        tile.set_cell(&edge, Cell::split(Reason::Shadow));
+        tile.set_cell(&edge, Cell::Split(Reason::Shadow));
         tile.split_beside_edges(0);
         let cells: Vec<_> = [[64, 128], [80, 144], [96, 128]].map(|p| tile.cell(&tile.place(0, p))).into();
-        assert_eq!(cells, [Cell::split(Reason::Shadow), Cell::split(Reason::Neighbour), Cell::Holds { error: 0.0 }]);
+        assert_eq!(cells, [Cell::Split(Reason::Shadow), Cell::Split(Reason::Neighbour), Cell::Holds { error: 0.0 }]);
     }
 
     #[test]
@@ -203,7 +179,7 @@ mod tests {
         let mut tile = Tile::new();
         tile.reset([0, 64]);
         let large = tile.place(0, [20, 70]);
-        tile.set_cell(&large, Cell::split(Reason::Crease));
+        tile.set_cell(&large, Cell::Split(Reason::Crease));
         assert_eq!(tile.cells_to_judge(1).len(), 4);
         let small = tile.place(1, [20, 70]);
         tile.set_cell(&small, Cell::Empty);
