@@ -411,7 +411,7 @@ mod tests {
             sub: 6,
             u: 0.25,
             v: 0.75,
-            normal_in_object: Vec3::X,
+            normal_in_object: DVec3::X,
             on_triangle: Default::default(),
         };
         assert_eq!(face_parameters(5, &hit), [4.75, 3.25]);

@@ -55,7 +55,7 @@ fn borders_of_random_meshes_are_bit_identical() {
     let mut points = 0;
     for seed in 0..150 {
         let mut mesh = random_mesh(seed);
-        if seed % 3 == 0 && !passes_an_edge_twice(&mesh) {
+        if seed % 3 == 0 {
             mesh.edits = random_edits(&mesh, seed);
         }
         let report = seams(&world_mesh(&mesh, DicingRate::Random(seed)));
@@ -63,16 +63,6 @@ fn borders_of_random_meshes_are_bit_identical() {
         points += report.points;
     }
     assert!(points > 100_000, "{points}");
-}
-
-/// A face that does so has two edges there, which an edit can move apart.
-fn passes_an_edge_twice(mesh: &ControlMesh) -> bool {
-    mesh.faces().any(|face| {
-        let next = face.iter().cycle().skip(1);
-        let mut edges: Vec<_> = face.iter().zip(next).map(|(a, b)| [*a.min(b), *a.max(b)]).collect();
-        edges.sort();
-        edges.windows(2).any(|pair| pair[0] == pair[1])
-    })
 }
 
 #[test]

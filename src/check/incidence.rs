@@ -71,8 +71,10 @@ impl Incidence {
         let topology = surface.topology();
         let is_visible = |h: &u32| !topology.is_hidden(FaceId(topology.face(*h)));
         let half_edges: Vec<u32> = (0..topology.n_half_edges() as u32).filter(is_visible).collect();
-        let edges: Vec<u32> =
-            half_edges.iter().copied().filter(|&h| ends(surface, h)[0] != ends(surface, h)[1]).collect();
+        // Where a face passes an edge again, that is another edge, which an edit can move away from the first.
+        let is_own = |h: u32| surface.edited().moves_points() && passes_again(surface, h);
+        let is_edge = |h: &u32| ends(surface, *h)[0] != ends(surface, *h)[1] && !is_own(*h);
+        let edges: Vec<u32> = half_edges.iter().copied().filter(is_edge).collect();
         let all = Groups::by_key(edges, |h| ends(surface, h));
         let shared = (0..all.len()).map(|e| all.get(e)).filter(|group| group.len() > 1);
         let n_open = (0..all.len()).filter(|&e| all.get(e).len() == 1).count();
@@ -122,6 +124,12 @@ pub(super) fn ends(surface: &Surface, h: u32) -> [u32; 2] {
     let topology = surface.topology();
     let (a, b) = (topology.vertex(h), topology.vertex(topology.next(h)));
     [a.min(b), a.max(b)]
+}
+
+/// Whether the face of `h` has passed the edge of `h` before.
+fn passes_again(surface: &Surface, h: u32) -> bool {
+    let (first, _) = surface.face_corners(FaceId(surface.topology().face(h)));
+    (first..h).any(|earlier| ends(surface, earlier) == ends(surface, h))
 }
 
 /// The rate of the whole edge of `h`.

@@ -6,7 +6,7 @@ use crate::ids::PatchId;
 use crate::math::{Intersect, Ray};
 use crate::mesh::shapes::noise::Random;
 use crate::scene::world::WorldMesh;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use serde::Serialize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -46,7 +46,7 @@ pub struct LeakReport {
     pub leaks: u64,
     /// Those of them that hit nothing at all.
     pub hit_nothing: u64,
-    /// Points aimed at, many rays each.
+    /// Lines and vertices aimed at, many rays each.
     pub targets: u64,
     /// Rays that were drawn but not traced: their target was seen edge-on, is too small for single precision, or
     /// they would have started among its triangles.
@@ -57,8 +57,10 @@ pub struct LeakReport {
 
 /// Rays of a task.
 const TASK_RAYS: u64 = 4096;
-/// Rays drawn for a target.
-const RAYS_PER_TARGET: u32 = 32;
+/// Points of a target that rays are aimed at.
+const POINTS_PER_TARGET: u32 = 8;
+/// Rays drawn for each point.
+const RAYS_PER_POINT: u32 = 16;
 /// Draws of a task for each ray it is to trace, before it gives up: a mesh may have no target at all.
 const MAX_DRAWS: u64 = 16;
 /// Leaks that are kept.
@@ -80,9 +82,10 @@ pub fn find_leaks<T: Intersect>(
     let n_tasks = if patches.is_empty() { 0 } else { settings.rays.div_ceil(TASK_RAYS) };
     let (next, done) = (AtomicU64::new(0), AtomicU64::new(0));
     let total = Mutex::new(Vec::new());
+    let world_from_lattice = mesh.lattice_from_world().inverse();
     let work = || {
         let targets = TargetFinder::new(mesh, incidence, &patches);
-        let mut worker = Worker { mesh, targets, tracer: make_tracer(), report: LeakReport::default() };
+        let mut worker = Worker { world_from_lattice, targets, tracer: make_tracer(), report: LeakReport::default() };
         while !cancel.load(Ordering::Relaxed) {
             let task = next.fetch_add(1, Ordering::Relaxed);
             if task >= n_tasks {
@@ -114,15 +117,16 @@ impl LeakReport {
 }
 
 struct Worker<'a, T> {
-    mesh: &'a WorldMesh,
+    world_from_lattice: DAffine3,
     targets: TargetFinder<'a>,
     tracer: T,
     report: LeakReport,
 }
 
-/// A ray in lattice space: it comes from `distance` steps before its target.
+/// A ray in lattice space: it comes from `distance` steps before the point that it is aimed at.
 #[derive(Clone, Copy)]
 struct Aim {
+    at: DVec3,
     direction: DVec3,
     distance: f64,
 }
@@ -131,30 +135,31 @@ impl<T: Intersect> Worker<'_, T> {
     fn run(&mut self, random: &mut Random, n_rays: u64) {
         let mut draws = MAX_DRAWS * n_rays;
         while self.report.rays < n_rays && draws > 0 {
-            draws = draws.saturating_sub(u64::from(RAYS_PER_TARGET));
+            draws = draws.saturating_sub(u64::from(POINTS_PER_TARGET * RAYS_PER_POINT));
             let Some(target) = self.targets.draw(random) else { continue };
             self.report.targets += 1;
-            for _ in 0..RAYS_PER_TARGET {
-                let aim = Aim::draw(random);
-                if self.report.rays < n_rays {
-                    self.shoot(&target, aim, random);
+            for _ in 0..POINTS_PER_TARGET {
+                let at = target.point(random);
+                for _ in 0..RAYS_PER_POINT.min((n_rays - self.report.rays) as u32) {
+                    self.shoot(&target, Aim::draw(at, random), random);
                 }
             }
         }
     }
 
     fn shoot(&mut self, target: &Target, aim: Aim, random: &mut Random) {
-        let margin = self.error(target, aim);
-        let is_before = aim.distance > target.outline.depth(-aim.direction) + margin;
-        if !is_before || !target.outline.encloses(aim.direction, margin) {
+        let margin = self.error(aim);
+        let is_before = aim.distance > target.outline.depth(aim.at, -aim.direction) + margin;
+        if !is_before || !target.outline.encloses(aim.at, aim.direction, margin) {
             self.report.unfit += 1;
             return;
         }
         self.report.rays += 1;
-        // The target is at this t; a power of two, so that directions of all lengths are tried and none is rounded.
+        // The point is at this t; a power of two, so that directions of all lengths are tried and none is rounded.
         let t_target = f64::powi(2.0, random.below(21) as i32 - 10);
-        let ray = self.world_ray(target, aim, t_target);
-        let last = t_target * (1.0 + (target.outline.depth(aim.direction) + margin) / aim.distance) * (1.0 + 1e-6);
+        let ray = self.world_ray(aim, t_target);
+        let last =
+            t_target * (1.0 + (target.outline.depth(aim.at, aim.direction) + margin) / aim.distance) * (1.0 + 1e-6);
         let hit = if random.chance(0.5) {
             let hit = self.tracer.closest(&ray).map(|hit| hit.t);
             (hit, hit.is_some_and(|t| f64::from(t) <= last))
@@ -181,30 +186,31 @@ impl<T: Intersect> Worker<'_, T> {
 
     /// How far, across the ray and in lattice steps, a triangle can seem from where it is: origin and direction are
     /// rounded to single precision, and so is each corner as seen from the origin (`LatticeRay` has the sums).
-    fn error(&self, target: &Target, aim: Aim) -> f64 {
-        let origin = target.point - aim.distance * aim.direction;
-        let reach = origin.abs().max_element() + MESH_WIDTH;
-        let to_lattice = self.mesh.lattice_from_world();
-        let in_world = to_lattice.inverse().transform_point3(origin).abs().max_element();
-        let world_step = to_lattice.matrix3.x_axis.length().recip();
+    fn error(&self, aim: Aim) -> f64 {
+        let reach = aim.origin().abs().max_element() + MESH_WIDTH;
+        let in_world = self.world_from_lattice.transform_point3(aim.origin()).abs().max_element();
+        let world_step = self.world_from_lattice.matrix3.x_axis.length();
         16.0 * f64::powi(2.0, -24) * reach + 1.0 + 8.0 * f64::EPSILON * in_world / world_step
     }
 
-    fn world_ray(&self, target: &Target, aim: Aim, t_target: f64) -> Ray {
-        let to_world = self.mesh.lattice_from_world().inverse();
-        let origin = to_world.transform_point3(target.point - aim.distance * aim.direction);
-        Ray::new(origin, to_world.transform_vector3(aim.direction * (aim.distance / t_target)))
+    fn world_ray(&self, aim: Aim, t_target: f64) -> Ray {
+        let origin = self.world_from_lattice.transform_point3(aim.origin());
+        Ray::new(origin, self.world_from_lattice.transform_vector3(aim.direction * (aim.distance / t_target)))
     }
 }
 
 impl Aim {
-    fn draw(random: &mut Random) -> Self {
+    fn origin(self) -> DVec3 {
+        self.at - self.distance * self.direction
+    }
+
+    fn draw(at: DVec3, random: &mut Random) -> Self {
         let distance = if random.chance(0.5) {
             MESH_WIDTH * random.within(1.0, 3.0)
         } else {
             MESH_WIDTH * f64::powf(2.0, random.within(-20.0, 0.0))
         };
-        Self { direction: draw_direction(random), distance }
+        Self { at, direction: draw_direction(random), distance }
     }
 }
 
@@ -233,7 +239,6 @@ mod tests {
     use crate::scene::intersect::Intersector;
     use crate::scene::rate::DicingRate;
     use crate::scene::world::{GridCache, World};
-    use glam::DAffine3;
 
     /// A tracer with a defect: what `misses` holds for is not hit.
     struct Faulty<'a, F>(Intersector<'a>, F);

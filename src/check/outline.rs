@@ -11,7 +11,7 @@ struct Segment {
     times: i32,
 }
 
-/// What surrounds a target, relative to it.
+/// What surrounds a target.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Outline {
     segments: Vec<Segment>,
@@ -52,17 +52,17 @@ impl TriangleSet {
         (self.max - self.min).max_element()
     }
 
-    /// The outline as seen from `target`.
-    pub fn outline(&mut self, target: DVec3) -> Outline {
+    /// Their outline.
+    pub fn outline(&mut self) -> Outline {
         self.edges.sort_unstable();
         let mut segments = Vec::new();
         for group in self.edges.chunk_by(|a, b| a.0 == b.0) {
             let times = group.iter().map(|edge| edge.1).sum();
             if times != 0 {
-                segments.push(Segment { ends: group[0].0.map(|v| point(v) - target), times });
+                segments.push(Segment { ends: group[0].0.map(point), times });
             }
         }
-        Outline { segments, min: self.min - target, max: self.max - target }
+        Outline { segments, min: self.min, max: self.max }
     }
 }
 
@@ -71,10 +71,10 @@ pub(super) fn point(v: Vertex) -> DVec3 {
 }
 
 impl Outline {
-    /// Whether the outline, seen along the unit vector `direction`, winds around the target and keeps `margin` away from it.
-    pub fn encloses(&self, direction: DVec3, margin: f64) -> bool {
+    /// Whether the outline, seen along the unit vector `direction`, winds around `point` and keeps `margin` away from it.
+    pub fn encloses(&self, point: DVec3, direction: DVec3, margin: f64) -> bool {
         let (right, up) = direction.any_orthonormal_pair();
-        let seen = |p: DVec3| DVec2::new(p.dot(right), p.dot(up));
+        let seen = |p: DVec3| DVec2::new((p - point).dot(right), (p - point).dot(up));
         let mut winding = 0;
         for segment in &self.segments {
             let [a, b] = segment.ends.map(seen);
@@ -86,9 +86,9 @@ impl Outline {
         winding != 0
     }
 
-    /// The farthest that a triangle reaches beyond the target along `direction`.
-    pub fn depth(&self, direction: DVec3) -> f64 {
-        (self.min * direction).max(self.max * direction).element_sum()
+    /// The farthest that a triangle reaches beyond `point` along `direction`.
+    pub fn depth(&self, point: DVec3, direction: DVec3) -> f64 {
+        ((self.min - point) * direction).max((self.max - point) * direction).element_sum()
     }
 }
 
@@ -120,17 +120,18 @@ mod tests {
         set.clear();
         let corners = [[10, 0, 0], [0, 10, 0], [-10, 0, 0], [0, -10, 0]];
         (0..4).for_each(|k| set.add([[0, 0, 1], corners[k], corners[(k + 1) % 4]], false));
-        set.outline(DVec3::new(0.0, 0.0, 1.0))
+        set.outline()
     }
 
     #[test]
     fn a_fan_of_triangles_encloses_its_centre_from_both_sides() {
         let outline = around_origin();
         assert_eq!(outline.segments.len(), 4);
-        assert!(outline.encloses(DVec3::Z, 7.0) && outline.encloses(DVec3::NEG_Z, 7.0));
-        assert!(!outline.encloses(DVec3::Z, 7.2), "the outline comes within 10 / sqrt 2");
-        assert!(!outline.encloses(DVec3::X, 0.1), "seen edge-on");
-        assert!((outline.depth(DVec3::NEG_Z) - 1.0).abs() < 1e-12);
+        let top = DVec3::Z;
+        assert!(outline.encloses(top, DVec3::Z, 7.0) && outline.encloses(top, DVec3::NEG_Z, 7.0));
+        assert!(!outline.encloses(top, DVec3::Z, 7.2), "the outline comes within 10 / sqrt 2");
+        assert!(!outline.encloses(top, DVec3::X, 0.1), "seen edge-on");
+        assert!((outline.depth(top, DVec3::NEG_Z) - 1.0).abs() < 1e-12);
     }
 
     #[test]
@@ -139,7 +140,7 @@ mod tests {
         set.clear();
         set.add([[0, 0, 0], [10, 0, 0], [0, 10, 0]], false);
         set.add([[0, 0, 0], [0, 10, 0], [-10, 0, 0]], false);
-        assert!(!set.outline(DVec3::ZERO).encloses(DVec3::Z, 0.5));
+        assert!(!set.outline().encloses(DVec3::ZERO, DVec3::Z, 0.5));
     }
 
     #[test]
@@ -148,6 +149,6 @@ mod tests {
         set.clear();
         set.add([[0, 0, 0], [10, 0, 0], [0, 10, 0]], false);
         set.add([[0, 0, 0], [10, 0, 0], [0, -10, 0]], true);
-        assert!(set.outline(DVec3::new(5.0, 0.0, 0.0)).encloses(DVec3::Z, 0.5));
+        assert!(set.outline().encloses(DVec3::new(5.0, 0.0, 0.0), DVec3::Z, 0.5));
     }
 }

@@ -17,12 +17,12 @@ const WANTED_EXTENT: f64 = 256.0;
 /// The widest window, in cells.
 const MAX_MARGIN: u32 = 32;
 
-/// A point that no ray may pass, and the triangles around it.
+/// A line between two grid vertices, or one of them, that no ray may pass, and the triangles around it.
 #[derive(Clone, Debug)]
 pub(super) struct Target {
     pub patch: PatchId,
-    /// In lattice steps.
-    pub point: DVec3,
+    /// In lattice steps; equal for a grid vertex.
+    pub ends: [DVec3; 2],
     pub outline: Outline,
     /// Where it is, for people.
     pub kind: &'static str,
@@ -78,8 +78,8 @@ impl<'a> TargetFinder<'a> {
             of(a, false).chain(of(b, same)).collect()
         };
         let run = edge_runs(surface, a, ends, rate)[0].run;
-        let point = self.run_point(run, random);
-        self.target("edge", run.patch, point, pieces)
+        let ends = self.run_ends(run);
+        self.target("edge", run.patch, ends, pieces)
     }
 
     fn at_vertex(&mut self, random: &mut Random) -> Option<Target> {
@@ -99,7 +99,7 @@ impl<'a> TargetFinder<'a> {
             };
             spokes.iter().map(window).collect()
         };
-        self.target("vertex", patch, point, pieces)
+        self.target("vertex", patch, [point; 2], pieces)
     }
 
     fn in_polygon(&mut self, random: &mut Random) -> Option<Target> {
@@ -113,9 +113,9 @@ impl<'a> TargetFinder<'a> {
         let rate = mesh.patch_rates(sides[0].0).sides[sides[0].1];
         let [from, to] = draw_segment(random, rate)?;
         let runs = sides.map(|(patch, side)| SideRun { patch, side, from, to });
-        let point = self.run_point(runs[0], random);
+        let ends = self.run_ends(runs[0]);
         let pieces = move |margin: u32| runs.map(|run| (Window::beside(mesh, run, margin), false)).to_vec();
-        self.target("polygon", runs[0].patch, point, pieces)
+        self.target("polygon", runs[0].patch, ends, pieces)
     }
 
     fn at_centre(&mut self, face: FaceId, n: u32) -> Option<Target> {
@@ -124,7 +124,7 @@ impl<'a> TargetFinder<'a> {
         let point = self.corner_point(patch, 2);
         let window = move |k: u32, margin: u32| Window::at_corner(mesh, mesh.surface().patch_of(face, k), 2, margin);
         let pieces = move |margin: u32| (0..n).map(|k| (window(k, margin), false)).collect();
-        self.target("centre", patch, point, pieces)
+        self.target("centre", patch, [point; 2], pieces)
     }
 
     /// A vertex, grid line or diagonal inside a patch; every other one lies on the border of a piece of 8 cells.
@@ -143,11 +143,10 @@ impl<'a> TargetFinder<'a> {
         if !is_inside(i, to_i, rates.n_u) || !is_inside(from_j.min(to_j), from_j.max(to_j), rates.n_v) {
             return None;
         }
-        let ends =
-            [(i, from_j), (to_i, to_j)].map(|(i, j)| self.vertex(Window::around(mesh, patch, [i; 2], [j; 2], 0)));
-        let point = between(ends, random);
+        let vertex = |(i, j)| point(self.vertex(Window::around(mesh, patch, [i; 2], [j; 2], 0)));
+        let ends = [(i, from_j), (to_i, to_j)].map(vertex);
         let (rows, columns) = ([from_j.min(to_j), from_j.max(to_j)], [i, to_i]);
-        self.target("inside", patch, point, move |margin| {
+        self.target("inside", patch, ends, move |margin| {
             vec![(Window::around(mesh, patch, columns, rows, margin), false)]
         })
     }
@@ -165,18 +164,16 @@ impl<'a> TargetFinder<'a> {
         point(self.vertex(Window::border(self.mesh, run)))
     }
 
-    /// A random point of a run of one or two border vertices.
-    fn run_point(&mut self, run: SideRun, random: &mut Random) -> DVec3 {
-        let ends =
-            [run.from, run.to].map(|at| self.vertex(Window::border(self.mesh, SideRun { from: at, to: at, ..run })));
-        between(ends, random)
+    /// The ends of a run of one or two border vertices.
+    fn run_ends(&mut self, run: SideRun) -> [DVec3; 2] {
+        [run.from, run.to].map(|at| point(self.vertex(Window::border(self.mesh, SideRun { from: at, to: at, ..run }))))
     }
 
     fn target(
         &mut self,
         kind: &'static str,
         patch: PatchId,
-        point: DVec3,
+        ends: [DVec3; 2],
         pieces: impl Fn(u32) -> Vec<Piece>,
     ) -> Option<Target> {
         let mut margin = 1;
@@ -191,7 +188,7 @@ impl<'a> TargetFinder<'a> {
                 window.triangles(&self.vertices, |triangle| triangles.add(triangle, is_turned));
             }
             if self.triangles.extent() >= WANTED_EXTENT || margin >= MAX_MARGIN {
-                return Some(Target { patch, point, outline: self.triangles.outline(point), kind });
+                return Some(Target { patch, ends, outline: self.triangles.outline(), kind });
             }
             margin *= 2;
         }
@@ -209,13 +206,15 @@ fn draw_segment(random: &mut Random, rate: u32) -> Option<[u32; 2]> {
     }
 }
 
-/// A point between two, sometimes the middle or very near to an end.
-fn between([a, b]: [Vertex; 2], random: &mut Random) -> DVec3 {
-    let t = match random.below(8) {
-        0 => 0.5,
-        1 => 1e-6 * random.unit(),
-        2 => 1.0 - 1e-6 * random.unit(),
-        _ => random.unit(),
-    };
-    point(a).lerp(point(b), t)
+impl Target {
+    /// A point between the ends, sometimes the middle, an end or very near to one.
+    pub fn point(&self, random: &mut Random) -> DVec3 {
+        let t = match random.below(8) {
+            0 => [0.0, 0.5, 1.0][random.below(3)],
+            1 => 1e-6 * random.unit(),
+            2 => 1.0 - 1e-6 * random.unit(),
+            _ => random.unit(),
+        };
+        self.ends[0].lerp(self.ends[1], t)
+    }
 }

@@ -185,5 +185,5 @@ fn rounded_to_f32(mut mesh: ControlMesh) -> ControlMesh {
 fn bench_hit(world: &World, hit: &Hit) -> BenchHit {
     let size = world.mesh(MeshId(0)).surface().face_size(hit.face);
     let [u, v] = face_parameters(size, hit);
-    BenchHit { t: hit.t, face: hit.face.0, u, v, normal: hit.normal_in_object }
+    BenchHit { t: hit.t, face: hit.face.0, u, v, normal: hit.normal_in_object.as_vec3() }
 }

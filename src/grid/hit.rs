@@ -1,7 +1,7 @@
 //! Triangles by number, and what a ray hit.
 
 use crate::ids::PatchId;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 /// One triangle of a mesh: patch, cell (i, j) and half, in one word whose order is that of (patch, j, i, half).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -71,9 +71,11 @@ impl LatticeHit {
 
     /// Cross product of the triangle's edges, in lattice units squared, along du x dv. Zero for a triangle without area,
     /// which can still be hit: it fills the crack between its neighbours.
+    ///
+    /// Exact, slivers included: edges are whole numbers below 2^25, products below 2^50, and f64 holds their differences.
     #[inline]
-    pub fn normal(&self) -> Vec3 {
-        let [a, b, c] = self.corners;
+    pub fn normal(&self) -> DVec3 {
+        let [a, b, c] = self.corners.map(|corner| corner.as_dvec3());
         (b - a).cross(c - a)
     }
 

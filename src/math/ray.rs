@@ -52,7 +52,7 @@ pub struct Hit {
     /// See `u`.
     pub v: f32,
     /// The triangle's geometric normal in object space (not normalised, along du x dv).
-    pub normal_in_object: Vec3,
+    pub normal_in_object: DVec3,
     /// Where on the triangle.
     pub on_triangle: OnTriangle,
 }

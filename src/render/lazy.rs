@@ -34,7 +34,7 @@ impl Tracer for Intersector<'_> {
         let to_world = mesh.world_from_object_normal();
         let toward_viewer = -ray.direction.normalize();
         let limit = *to_world * self.limit_normal(hit);
-        let triangle = *to_world * hit.normal_in_object.as_dvec3();
+        let triangle = *to_world * hit.normal_in_object;
         let geometric_normal = normalized(triangle).or(normalized(limit)).unwrap_or(toward_viewer);
         let shading_normal = match normalized(limit) {
             Some(n) if n.dot(geometric_normal) >= 0.0 => n,

@@ -16,7 +16,7 @@ use crate::ids::{MeshId, PatchId};
 use crate::math::simd::{self, Kernel, Task};
 use crate::math::{Bounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
 use crate::subdiv::{Dicer, PatchRates, Surface};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// Children of a node along u and v.
 const NODE_SIDE: u32 = 4;
@@ -451,15 +451,10 @@ impl<'w> Intersector<'w> {
             sub,
             u: u / rates.n_u as f32,
             v: v / rates.n_v as f32,
-            normal_in_object: normal_in_object(found.normal(), mesh.surface().lattice().step),
+            normal_in_object: found.normal() * mesh.surface().lattice().step.powi(2),
             on_triangle: OnTriangle { corners: found.corners, weights: found.barycentrics },
         }
     }
-}
-
-/// Lattice normals have the size of a cell's area in steps, object normals that in object units.
-fn normal_in_object(normal: Vec3, step: f64) -> Vec3 {
-    (normal.as_dvec3() * step * step).as_vec3()
 }
 
 fn triangle_id(world: &World, of: &PrimitiveRef) -> TriangleId {

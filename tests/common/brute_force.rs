@@ -85,11 +85,8 @@ impl<'w> BruteForce<'w> {
             return Some(format!("the hit is {distance} steps from the triangle it names, {allowed} are allowed"));
         }
         let (face, sub) = mesh.surface().face_of(patch.id);
-        // A sliver's normal is lost among the rounding errors of the products that it is the difference of.
-        let is_sliver = triangle.normal().length() < triangle.longest().powi(2) * 2f64.powi(-14);
-        let normal = if is_sliver { DVec3::ZERO } else { triangle.normal().normalize_or_zero() };
-        let same_side = normal.dot(hit.normal_in_object.as_dvec3().normalize_or_zero());
-        (hit.face != face || hit.sub != sub || (normal != DVec3::ZERO && same_side < 0.999)).then(|| {
+        let normal = triangle.normal() * mesh.surface().lattice().step.powi(2);
+        (hit.face != face || hit.sub != sub || hit.normal_in_object != normal).then(|| {
             format!("face {}.{} and normal {} are not those of the triangle", hit.face, hit.sub, hit.normal_in_object)
         })
     }

@@ -142,6 +142,11 @@ impl EditedPatches {
         self.holes.cell_unit(patch)
     }
 
+    /// Whether there are edits of points or sharpness at level 1 or deeper.
+    pub fn moves_points(&self) -> bool {
+        !self.trees.is_empty()
+    }
+
     /// Whether there are holes at level 1 or deeper.
     pub fn has_holes(&self) -> bool {
         !self.holes.is_empty()

@@ -39,6 +39,8 @@ pub(super) struct EditedMesh {
     pub points: Vec<Point>,
     /// One for each face.
     faces: Vec<Option<EditedFace>>,
+    /// For each half-edge, its edge: equal for all sheets of a non-manifold edge, and for nothing else.
+    edges: Vec<u32>,
 }
 
 impl EditedMesh {
@@ -56,7 +58,8 @@ impl EditedMesh {
             let node = cx.trie.root(FaceId(face))?;
             Some(EditedFace { node, vertex_0: topology.face_corners(face).0 })
         });
-        EditedMesh { points: x.sources.iter().map(|&v| control_point(v)).collect(), mesh: x.mesh, faces }
+        let edges = sources_of_half_edges(topology, &x).map(|h| topology.edge_id(h)).collect();
+        EditedMesh { points: x.sources.iter().map(|&v| control_point(v)).collect(), mesh: x.mesh, faces, edges }
     }
 
     /// Whether an edit of a later step lies in one of the faces.
@@ -68,8 +71,8 @@ impl EditedMesh {
     pub fn quarters(&self, cx: &Context<'_>) -> Vec<EditedMesh> {
         let Refined { mut mesh, origin } = rules::refine(&cx.rules, &self.mesh);
         let points = origin.iter().map(|o| self.refined_point(&cx.rules, *o)).collect();
-        join_sheets(&self.mesh, &origin, &mut mesh);
-        let mut refined = EditedMesh { mesh, points, faces: self.child_faces(cx.trie) };
+        join_sheets(self, &origin, &mut mesh);
+        let mut refined = EditedMesh { mesh, points, faces: self.child_faces(cx.trie), edges: self.child_edges() };
         refined.apply_edits(cx);
         let n = self.mesh.n_corners();
         (0..n).map(|k| refined.ring(child_start(n, k), cx.outer_tags)).collect()
@@ -101,6 +104,26 @@ impl EditedMesh {
             Some(EditedFace { node: trie.child(node, k)?, vertex_0: 4 * h + turn })
         };
         (0..self.mesh.n_half_edges() as u32).map(child).collect()
+    }
+
+    /// The edges after a step: halves of an edge are told apart by their vertex, and those of one that leads back to its
+    /// vertex, which has one sheet only, by their order.
+    fn child_edges(&self) -> Vec<u32> {
+        let mut numbers = FxHashMap::default();
+        let mut number = |key: (u32, u32)| {
+            let next = numbers.len() as u32;
+            *numbers.entry(key).or_insert(next)
+        };
+        let mut edges = Vec::with_capacity(4 * self.mesh.n_half_edges());
+        for h in 0..self.mesh.n_half_edges() as u32 {
+            let before = self.mesh.prev(h);
+            let leads_back = self.mesh.vertex(before) == self.mesh.vertex(h);
+            let end = if leads_back { NONE } else { self.mesh.vertex(h) };
+            edges.push(number((self.edges[h as usize], self.mesh.vertex(h))));
+            edges.extend([1, 2].map(|k| number((NONE, 4 * h + k))));
+            edges.push(number((self.edges[before as usize], end)));
+        }
+        edges
     }
 
     /// Applies the edits of this level, in file order.
@@ -155,7 +178,8 @@ impl EditedMesh {
         let spokes = |v: u32| (0..n).filter(|&h| self.mesh.vertex(h) == v).collect();
         let x = extract_whole(&self.mesh, first, outer_tags, spokes);
         let faces = local_faces(&self.mesh, &x, |face| self.faces[face as usize]);
-        EditedMesh { points: x.sources.iter().map(|&v| self.points[v as usize]).collect(), mesh: x.mesh, faces }
+        let edges = sources_of_half_edges(&self.mesh, &x).map(|h| self.edges[h as usize]).collect();
+        EditedMesh { points: x.sources.iter().map(|&v| self.points[v as usize]).collect(), mesh: x.mesh, faces, edges }
     }
 }
 
@@ -174,24 +198,22 @@ fn local_faces<M: HalfEdges>(
     x.starts.iter().zip(&x.mesh.face_start).map(local).collect()
 }
 
+/// The half-edges of the mesh that a ring was cut from, in the ring's order.
+fn sources_of_half_edges<M: HalfEdges>(source: &M, x: &Extracted) -> impl Iterator<Item = u32> {
+    x.starts.iter().flat_map(move |&start| {
+        let (_, n) = source.face_corners(source.face(start));
+        std::iter::successors(Some(start), move |&h| Some(source.next(h))).take(n as usize)
+    })
+}
+
 /// Makes the middles of a non-manifold edge, of which refining gives every face its own, one vertex again: edits of it in one
 /// face concern them all.
-fn join_sheets(before: &LocalMesh, origin: &[Origin], refined: &mut LocalMesh) {
-    let mut known: FxHashMap<[u32; 2], (u32, u32)> = FxHashMap::default();
+fn join_sheets(before: &EditedMesh, origin: &[Origin], refined: &mut LocalMesh) {
+    let mut known: FxHashMap<u32, u32> = FxHashMap::default();
     let mut joined: Vec<u32> = (0..origin.len() as u32).collect();
     for (v, origin) in origin.iter().enumerate() {
         let Origin::Edge(h) = *origin else { continue };
-        let mut ends = [before.vertex(h), before.vertex(before.next(h))];
-        ends.sort_unstable();
-        if before.twin(h) != NONE || ends[0] == ends[1] {
-            continue;
-        }
-        let (shared, last_face) = known.entry(ends).or_insert((v as u32, NONE));
-        // A face that passes the edge twice has another edge there.
-        if *last_face != before.face(h) {
-            *last_face = before.face(h);
-            joined[v] = *shared;
-        }
+        joined[v] = *known.entry(before.edges[h as usize]).or_insert(v as u32);
     }
     let ends = refined.fins.iter_mut().flat_map(|fin| &mut fin.1);
     refined.vertex.iter_mut().chain(ends).for_each(|v| *v = joined[*v as usize]);
