@@ -411,16 +411,29 @@ impl Evaluator {
         }
     }
 
-    /// The ring points of a child of a polygon, appended to `out`.
-    pub fn child_ring(library: &PlanLibrary, node: NodeId, ring: &[Point], k: usize, out: &mut Vec<Point>) -> NodeId {
-        match library.plan(node) {
-            Plan::Split { rows, children, .. } => {
-                let child = &children[k];
-                out.extend(child.points.iter().map(|&p| product(rows, p as usize, ring)));
-                child.node
-            }
-            Plan::Regular(_) => unreachable!("a polygon is never regular"),
+    /// Appends to a polygon's ring points those of its refinement, which all its children share.
+    pub fn refine_polygon(library: &PlanLibrary, node: NodeId, points: &mut Vec<Point>) {
+        let (rows, _) = polygon(library, node);
+        for i in 0..rows.len() {
+            // After row 0 the slice ends with the face point, where other rows look for it.
+            let refined = product(rows, i, points);
+            points.push(refined);
         }
+    }
+
+    /// The ring points of a child of a polygon, appended to `out`; `points` are those of [`Self::refine_polygon`].
+    pub fn child_ring(library: &PlanLibrary, node: NodeId, points: &[Point], k: usize, out: &mut Vec<Point>) -> NodeId {
+        let child = &polygon(library, node).1[k];
+        let refined = &points[library.n_points(node)..];
+        out.extend(child.points.iter().map(|&p| refined[p as usize]));
+        child.node
+    }
+}
+
+fn polygon(library: &PlanLibrary, node: NodeId) -> (&SparseRows, &[Child]) {
+    match library.plan(node) {
+        Plan::Split { rows, children, .. } => (rows, children),
+        Plan::Regular(_) => unreachable!("a polygon is never regular"),
     }
 }
 

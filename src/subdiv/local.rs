@@ -164,8 +164,10 @@ pub fn extract<M: HalfEdges + ?Sized>(mesh: &M, first: u32, outer_tags: bool) ->
     x.finish(&corner_tags, outer_tags)
 }
 
-/// Rings with more faces than this are found by [`extract`], whose time does not grow with the square of their size.
+/// Rings with more faces or corners than these are found by [`extract`], whose time does not grow with the square of
+/// their size.
 const MAX_SCANNED_FACES: usize = 64;
+const MAX_SCANNED_CORNERS: u32 = 512;
 
 /// Finds the vertices of rings without making the ring: what loading a patch needs, again and again.
 #[derive(Debug, Default)]
@@ -193,6 +195,10 @@ impl RingWalker {
                 return &self.vertices;
             }
         }
+        if self.n_corners(topology) > MAX_SCANNED_CORNERS {
+            self.vertices = extract(topology, first, outer_tags).sources;
+            return &self.vertices;
+        }
         self.add_vertices(topology);
         for _ in 0..n_corners {
             if let Some(ends) = topology.crease_ends(h) {
@@ -201,6 +207,10 @@ impl RingWalker {
             h = topology.next(h);
         }
         &self.vertices
+    }
+
+    fn n_corners(&self, topology: &Topology) -> u32 {
+        self.faces.iter().map(|&face| topology.face_corners(face).1).sum()
     }
 
     fn add_face(&mut self, topology: &Topology, h: u32) {

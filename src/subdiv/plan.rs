@@ -79,11 +79,12 @@ pub enum Plan {
     Regular(SparseRows),
     /// One Catmull-Clark step, then the quarters (a polygon of n sides has n children).
     Split {
-        /// The refined points that children use.
+        /// The refined points that children use. A polygon's first row is its face point, and the others count that as
+        /// one more ring point.
         rows: SparseRows,
         /// One child per corner. Quarters of quads keep the quad's orientation; children of polygons start at their corner.
         children: Vec<Child>,
-        /// Limits at the corners.
+        /// Limits at the corners; none for polygons, of which only the children are evaluated.
         limits: Vec<Limit>,
         /// Whether the surface lies in the convex hull of the ring (all weights from here on are non-negative).
         in_hull: bool,
@@ -180,7 +181,11 @@ impl PlanLibrary {
         let children: Vec<Child> =
             rings.iter().zip(points).map(|(child, points)| Child { node: self.node(&child.mesh), points }).collect();
         let packed = SparseRows::new(&rows);
-        let limits = (0..n).map(|k| self.limit(id, ring, &packed, &children[k as usize], k)).collect();
+        let limits = if n == 4 {
+            (0..n).map(|k| self.limit(id, ring, &packed, &children[k as usize], k)).collect()
+        } else {
+            Vec::new()
+        };
         let semi_sharp = ring.tags.iter().any(|t| !t.semi_sharp.is_empty());
         let in_hull = !(self.outer_tags() && semi_sharp);
         Plan::Split { rows: packed, children, limits, in_hull }
@@ -190,23 +195,19 @@ impl PlanLibrary {
     fn shared_rows(&self, ring: &LocalMesh, refined: &Refined, rings: &[Extracted]) -> (Vec<Row>, Vec<Vec<u32>>) {
         let mut place = vec![NONE; refined.origin.len()];
         let mut rows = Vec::new();
-        let points = rings
-            .iter()
-            .map(|child| {
-                let place_of = |&v: &u32| {
-                    if place[v as usize] == NONE {
-                        place[v as usize] = rows.len() as u32;
-                        rows.push(rules::refined_row(
-                            &self.rules,
-                            ring,
-                            corner_origin(ring, refined.origin[v as usize]),
-                        ));
-                    }
-                    place[v as usize]
-                };
-                child.sources.iter().map(place_of).collect()
-            })
-            .collect();
+        let mut place_of = |&v: &u32| {
+            if place[v as usize] == NONE {
+                place[v as usize] = rows.len() as u32;
+                let origin = corner_origin(ring, refined.origin[v as usize]);
+                rows.push(rules::refined_row(&self.rules, ring, origin));
+            }
+            place[v as usize]
+        };
+        if ring.n_corners() != 4 {
+            let face_point = refined.origin.iter().position(|o| matches!(o, Origin::Face(0)));
+            place_of(&(face_point.expect("every face is refined") as u32));
+        }
+        let points = rings.iter().map(|child| child.sources.iter().map(&mut place_of).collect()).collect();
         (rows, points)
     }
 
@@ -217,7 +218,6 @@ impl PlanLibrary {
             CornerLimit::Smooth(position, [along, next]) => {
                 let negated = |row: &Row| -> Row { row.iter().map(|&(p, w)| (p, -w)).collect() };
                 let [du, dv] = match k {
-                    _ if ring.n_corners() != 4 => [along, next],
                     0 => [along, next],
                     1 => [negated(&next), along],
                     2 => [negated(&along), negated(&next)],
@@ -226,10 +226,7 @@ impl PlanLibrary {
                 Limit::Smooth(SparseRows::new([&position, &du, &dv]))
             }
             CornerLimit::Iterate if child.node == id => Limit::Position(iterate(ring, rows, child, k)),
-            CornerLimit::Iterate | CornerLimit::Descend => {
-                let corner = if ring.n_corners() == 4 { k } else { 0 };
-                self.pull_back(rows, child, corner)
-            }
+            CornerLimit::Iterate | CornerLimit::Descend => self.pull_back(rows, child, k),
         }
     }
 

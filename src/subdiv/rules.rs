@@ -97,7 +97,14 @@ fn mask(sharpness: f32, n_sharp: usize) -> Mask {
 }
 
 /// The mean of a face's vertices.
+///
+/// That of a polygon that is the target counts as a point itself, the one after the ring's points: written out, it would
+/// make the rows of a polygon's quarters as long as the polygon has corners.
 pub fn face_point(mesh: &LocalMesh, face: u32) -> Row {
+    if face == 0 && mesh.n_corners() != 4 { vec![(mesh.n_vertices() as u32, 1.0)] } else { mean(mesh, face) }
+}
+
+fn mean(mesh: &LocalMesh, face: u32) -> Row {
     let (start, n) = mesh.face_corners(face);
     (start..start + n).map(|h| (mesh.vertex[h as usize], 1.0 / f64::from(n))).collect()
 }
@@ -465,12 +472,12 @@ fn refined_tags(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> VertexTags
     }
 }
 
-/// The row of a refined vertex; vertices must be corners of the target.
+/// The row of a refined vertex, see [`face_point`] for its columns; vertices must be corners of the target.
 pub fn refined_row(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> Row {
     match origin {
         Origin::Vertex(h) => vertex_point(rules, mesh, h),
         Origin::Edge(h) => edge_point(rules, mesh, h),
-        Origin::Face(f) => merge(face_point(mesh, f)),
+        Origin::Face(f) => merge(mean(mesh, f)),
         Origin::Middle([a, b]) => merge(vec![(a, 0.5), (b, 0.5)]),
         Origin::Nothing => Row::new(),
     }

@@ -81,7 +81,9 @@ pub struct PatchPoints {
     node: NodeId,
     control: ControlPoints,
     ring: Vec<Point>,
-    parent: Vec<Point>,
+    /// The last polygon, and the points of its ring and refinement.
+    polygon_face: Option<FaceId>,
+    polygon: Vec<Point>,
     walker: RingWalker,
 }
 
@@ -92,7 +94,8 @@ impl Default for PatchPoints {
             node: REGULAR,
             control: [Point::ZERO; 16],
             ring: Vec::new(),
-            parent: Vec::new(),
+            polygon_face: None,
+            polygon: Vec::new(),
             walker: RingWalker::default(),
         }
     }
@@ -101,7 +104,7 @@ impl Default for PatchPoints {
 impl PatchPoints {
     /// Forgets the patch.
     pub fn forget(&mut self) {
-        self.patch = None;
+        (self.patch, self.polygon_face) = (None, None);
     }
 }
 
@@ -251,16 +254,28 @@ impl Surface {
         if points.node == EDITED {
             return;
         }
-        let sources = points.walker.sources(&self.topology, first, self.library.outer_tags());
         points.ring.clear();
         if size == 4 {
+            let sources = points.walker.sources(&self.topology, first, self.library.outer_tags());
             points.ring.extend(sources.iter().map(|&v| self.control_point(v)));
         } else {
-            points.parent.clear();
-            points.parent.extend(sources.iter().map(|&v| self.control_point(v)));
-            let (parent, ring) = (&points.parent, &mut points.ring);
-            points.node = Evaluator::child_ring(&self.library, points.node, parent, sub as usize, ring);
+            self.load_polygon(face, points);
+            let parent = &points.polygon;
+            points.node = Evaluator::child_ring(&self.library, points.node, parent, sub as usize, &mut points.ring);
         }
+    }
+
+    /// Refines a polygon, unless it is the last one: its patches, which it may have many of, are often loaded in a row.
+    fn load_polygon(&self, face: FaceId, points: &mut PatchPoints) {
+        if points.polygon_face == Some(face) {
+            return;
+        }
+        points.polygon_face = Some(face);
+        let (first, _) = self.topology.face_corners(face.0);
+        let sources = points.walker.sources(&self.topology, first, self.library.outer_tags());
+        points.polygon.clear();
+        points.polygon.extend(sources.iter().map(|&v| self.control_point(v)));
+        Evaluator::refine_polygon(&self.library, points.node, &mut points.polygon);
     }
 
     /// The quadtree of a patch under edits.

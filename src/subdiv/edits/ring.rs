@@ -70,7 +70,8 @@ impl EditedMesh {
     /// The rings of the target's quarters after a step, edits of that level applied.
     pub fn quarters(&self, cx: &Context<'_>) -> Vec<EditedMesh> {
         let Refined { mut mesh, origin } = rules::refine(&cx.rules, &self.mesh);
-        let points = origin.iter().map(|o| self.refined_point(&cx.rules, *o)).collect();
+        let known = self.points_and_face_point();
+        let points = origin.iter().map(|o| self.refined_point(&cx.rules, *o, &known)).collect();
         join_sheets(self, &origin, &mut mesh);
         let mut refined = EditedMesh { mesh, points, faces: self.child_faces(cx.trie), edges: self.child_edges() };
         refined.apply_edits(cx);
@@ -79,7 +80,7 @@ impl EditedMesh {
     }
 
     /// Vertices that are no corners of the target move too, but no quarter's ring has them.
-    fn refined_point(&self, rules: &RuleSet, origin: Origin) -> Point {
+    fn refined_point(&self, rules: &RuleSet, origin: Origin, known: &[Point]) -> Point {
         let origin = match origin {
             Origin::Vertex(h) => {
                 let v = self.mesh.vertex(h);
@@ -90,7 +91,16 @@ impl EditedMesh {
             }
             other => other,
         };
-        weighted_sum(&rules::refined_row(rules, &self.mesh, origin), &self.points)
+        weighted_sum(&rules::refined_row(rules, &self.mesh, origin), known)
+    }
+
+    /// What the columns of rows mean, see [`rules::face_point`].
+    fn points_and_face_point(&self) -> Vec<Point> {
+        let n = self.mesh.n_corners();
+        let share = 1.0 / f64::from(n);
+        let corner = |h: u32| self.points[self.mesh.vertex(h) as usize] * share;
+        let mean = (0..n).fold(Point::ZERO, |sum, h| sum + corner(h));
+        self.points.iter().copied().chain([mean]).collect()
     }
 
     /// The faces after a step, one for each half-edge.
