@@ -28,7 +28,7 @@ fn torus(n: usize) -> Vec<Bounds> {
 #[divan::bench(args = [100, 316, 1000])]
 fn build(bencher: Bencher, n: usize) {
     let boxes = torus(n);
-    bencher.counter(ItemsCount::new(n * n)).bench(|| TopLevel::build(black_box(&boxes)));
+    bencher.counter(ItemsCount::new(n * n)).bench(|| TopLevel::build(black_box(&boxes), 1));
 }
 
 /// Rays between random places of the mesh's cube; a patch is hit if the ray comes near the middle of its box.
@@ -69,7 +69,7 @@ fn nearest(origin: Vec3, direction: Vec3, p: Vec3) -> Vec3 {
 #[divan::bench(args = [100, 316, 1000])]
 fn walk(bencher: Bencher, n: usize) {
     let boxes = torus(n);
-    let tree = TopLevel::build(&boxes);
+    let tree = TopLevel::build(&boxes, 1);
     let n_rays = 10_000;
     let walk = || run(Walk { tree: &tree, boxes: &boxes, n_rays });
     println!(

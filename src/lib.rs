@@ -27,6 +27,7 @@ pub mod image;
 pub mod io;
 pub mod math;
 pub mod mesh;
+pub mod parallel;
 pub mod render;
 pub mod report;
 pub mod scene;

@@ -10,11 +10,12 @@ use crate::grid::MAX_CELLS;
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Bounds, DBounds};
 use crate::mesh::{ControlMesh, TexCoords};
+use crate::parallel::{ITEMS_PER_TASK, for_ranges};
 use crate::subdiv::dice::LATTICE_SHIFT;
 use crate::subdiv::{Dicer, PatchRates, Surface};
 use glam::{DAffine3, DMat3, DVec3};
 use parking_lot::Mutex;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Quarters of an irregular patch that its box looks into: more make the box tighter, and building slower.
 const BOX_DEPTH: u32 = 3;
@@ -22,9 +23,6 @@ const BOX_DEPTH: u32 = 3;
 /// Lattice steps around a mesh's box within which a ray is worth a look: rays are rounded to f32 near the mesh, which
 /// moves them by less than 48 steps.
 const REACH_MARGIN: f64 = 256.0;
-
-/// Patches whose boxes one thread computes before it asks for more.
-const PATCHES_PER_TASK: usize = 4096;
 
 /// Bytes of the tree over a mesh's patches, for each: a node of 224 bytes for every four to five of them.
 const TREE_BYTES_PER_PATCH: usize = 50;
@@ -90,7 +88,7 @@ impl World {
         let all = bounds.fold(DBounds::EMPTY, DBounds::union);
         let scene_from_world = scene_space(all);
         let boxes: Vec<Bounds> = meshes.iter().map(|m| scene_box(scene_from_world, m.bounds_in_world)).collect();
-        Self { top: TopLevel::build(&boxes), meshes, scene_from_world }
+        Self { top: TopLevel::build(&boxes, 1), meshes, scene_from_world }
     }
 
     /// The meshes, by [`MeshId`].
@@ -173,7 +171,7 @@ impl WorldMesh {
         let bounds = boxes.iter().fold(Bounds::EMPTY, |a, b| a.union(*b));
         let bounds_in_world = world_box(&surface, world_from_object, bounds);
         let reach = DBounds { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() }.expanded(REACH_MARGIN);
-        let top = TopLevel::build(&boxes);
+        let top = TopLevel::build(&boxes, n_threads);
         let visible = (patches.len() != surface.n_patches()).then_some(patches);
         Ok(Self {
             top,
@@ -295,7 +293,7 @@ impl WorldMesh {
 
     fn full_tessellation(&self, n_threads: usize) -> FullTessellation {
         let (triangles, pieces, bytes) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
-        in_parallel(self.n_leaves(), n_threads, |range| {
+        for_ranges(self.n_leaves(), n_threads, |range| {
             let mut sum = [0; 3];
             for leaf in range {
                 let patch = self.patch_of_leaf(PatchId::from(leaf));
@@ -328,30 +326,12 @@ fn full_bytes(rates: &PatchRates, n_pieces: u64) -> u64 {
     vertices + 160 * n_pieces + nodes
 }
 
-/// Calls `work` with ranges that together are `0..n`, on `n_threads` threads.
-pub(super) fn in_parallel(n: usize, n_threads: usize, work: impl Fn(std::ops::Range<usize>) + Sync) {
-    let next = AtomicUsize::new(0);
-    let worker = || loop {
-        let start = next.fetch_add(PATCHES_PER_TASK, Ordering::Relaxed);
-        if start >= n {
-            break;
-        }
-        work(start..(start + PATCHES_PER_TASK).min(n));
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..n_threads.min(n.div_ceil(PATCHES_PER_TASK)) {
-            scope.spawn(worker);
-        }
-        worker();
-    });
-}
-
 fn patch_boxes(surface: &Surface, patches: &[PatchId], n_threads: usize) -> Vec<Bounds> {
     let mut boxes = vec![Bounds::EMPTY; patches.len()];
-    let chunks: Vec<_> = boxes.chunks_mut(PATCHES_PER_TASK).map(parking_lot::Mutex::new).collect();
-    in_parallel(patches.len(), n_threads, |range| {
+    let chunks: Vec<_> = boxes.chunks_mut(ITEMS_PER_TASK).map(parking_lot::Mutex::new).collect();
+    for_ranges(patches.len(), n_threads, |range| {
         let mut dicer = Dicer::default();
-        let mut chunk = chunks[range.start / PATCHES_PER_TASK].lock();
+        let mut chunk = chunks[range.start / ITEMS_PER_TASK].lock();
         for (b, patch) in chunk.iter_mut().zip(&patches[range]) {
             *b = dicer.patch_bounds(surface, *patch, BOX_DEPTH);
         }

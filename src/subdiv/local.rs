@@ -383,7 +383,7 @@ mod tests {
         let shapes = shapes::all().into_iter().map(|(_, mesh)| mesh);
         let mut walker = RingWalker::default();
         for mesh in shapes.chain((0..100).map(random_mesh)) {
-            let topology = Topology::new(&mesh);
+            let topology = Topology::new(&mesh, 1);
             for face in 0..topology.n_faces() as u32 {
                 let first = topology.face_corners(face).0;
                 for outer_tags in [false, true] {

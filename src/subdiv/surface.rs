@@ -111,10 +111,11 @@ impl PatchPoints {
 impl Surface {
     /// Prepares a mesh, on `n_threads` threads.
     pub fn new(mesh: &ControlMesh, n_threads: usize) -> Result<Self> {
-        let topology = Topology::new(mesh);
+        let n_threads = n_threads.max(1);
+        let topology = Topology::new(mesh, n_threads);
         let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
         let sites = EditSites::new(&mesh.edits, &topology);
-        let (library, plan_of_face) = plan_faces(&topology, rules, n_threads.max(1), &sites);
+        let (library, plan_of_face) = plan_faces(&topology, rules, n_threads, &sites);
         let first_patch = (!topology.all_quads()).then(|| first_patches(&mesh.face_sizes));
         if first_patch.as_ref().is_some_and(|f| f.last().is_some_and(|&n| n > u32::MAX / 2)) {
             return Err(Error::input("the mesh has more than 2^31 patches: split it"));

@@ -2,9 +2,13 @@
 
 use super::face_index::FaceIndex;
 use super::half_edges::{HalfEdges, NONE, VertexTags, fan, fan_size};
+use super::pairs::{HalfEdgesByVertex, ends};
 use crate::ids::{FaceId, VertexId};
 use crate::mesh::{BoundaryRule, ControlMesh, CreaseMethod, Edit, EditKind, TriangleRule};
+use crate::parallel::for_ranges;
+use parking_lot::Mutex;
 use rustc_hash::{FxHashMap, FxHashSet};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Sharpness at and above which an edge or vertex is infinitely sharp (OpenSubdiv `Sdc::Crease::SHARPNESS_INFINITE`).
 const INFINITE_SHARPNESS: f32 = 10.0;
@@ -66,13 +70,13 @@ fn clamp_sharpness(s: f32) -> f32 {
 }
 
 impl Topology {
-    /// Half-edges and tags of a valid mesh.
-    pub fn new(mesh: &ControlMesh) -> Self {
+    /// Half-edges and tags of a valid mesh, found on `n_threads` threads.
+    pub fn new(mesh: &ControlMesh, n_threads: usize) -> Self {
         let n_vertices = mesh.positions.len();
         let mut topology = Topology {
             faces: FaceIndex::new(&mesh.face_sizes),
             vertex: mesh.face_vertices.clone(),
-            twin: vec![NONE; mesh.face_vertices.len()],
+            twin: Vec::new(),
             n_vertices,
             tagged: vec![0; n_vertices / 64 + 1],
             edge_sharpness: FxHashMap::default(),
@@ -85,44 +89,21 @@ impl Topology {
             crease_method: mesh.crease_method,
             triangles: mesh.triangles,
         };
-        let by_vertex = HalfEdgesByVertex::new(&topology);
-        let nonmanifold = topology.pair_twins(&by_vertex);
+        let by_vertex = HalfEdgesByVertex::new(&topology, n_threads);
+        let (twin, tangles) = by_vertex.pair(&topology, n_threads);
+        topology.twin = twin;
+        let mut nonmanifold = Vec::new();
+        tangles.iter().for_each(|tangle| topology.add_nonmanifold(tangle, &mut nonmanifold));
         let infinite = topology.tag_edges(mesh, &by_vertex);
         drop(by_vertex);
         if !mesh.edits.is_empty() {
             topology.separate_passages();
         }
         topology.edit_edges(mesh);
-        topology.tag_vertices(mesh, &nonmanifold);
+        topology.tag_vertices(mesh, &nonmanifold, n_threads);
         topology.edit_vertices(mesh);
         topology.hide_faces(mesh, &infinite, &nonmanifold);
         topology
-    }
-
-    /// Pairs half-edges into manifold edges; returns the non-manifold edges.
-    fn pair_twins(&mut self, by_vertex: &HalfEdgesByVertex) -> Vec<NonmanifoldEdge> {
-        let mut nonmanifold = Vec::new();
-        let mut group: Vec<(u32, u32)> = Vec::new();
-        for v in 0..self.n_vertices as u32 {
-            group.clear();
-            group.extend(by_vertex.lower(v).iter().map(|&h| (self.upper_vertex(h), h)));
-            group.sort_unstable();
-            for edge in group.chunk_by(|a, b| a.0 == b.0) {
-                match *edge {
-                    [(w, _)] if w != v => {}
-                    [(w, a), (_, b)] if w != v && self.can_be_twins(a, b) => {
-                        self.twin[a as usize] = b;
-                        self.twin[b as usize] = a;
-                    }
-                    _ => self.add_nonmanifold(edge, &mut nonmanifold),
-                }
-            }
-        }
-        nonmanifold
-    }
-
-    fn can_be_twins(&self, a: u32, b: u32) -> bool {
-        self.vertex[a as usize] != self.vertex[b as usize] && self.faces.face(a) != self.faces.face(b)
     }
 
     /// Splits the half-edges between one pair of vertices into edges: the first holds each face's first passage; every
@@ -148,10 +129,6 @@ impl Topology {
         }
     }
 
-    fn upper_vertex(&self, h: u32) -> u32 {
-        self.vertex[h as usize].0.max(self.vertex[HalfEdges::next(self, h) as usize].0)
-    }
-
     /// Applies crease tags; returns the vertex pairs that a tag made infinitely sharp.
     fn tag_edges(&mut self, mesh: &ControlMesh, by_vertex: &HalfEdgesByVertex) -> FxHashSet<[u32; 2]> {
         let mut infinite = FxHashSet::default();
@@ -164,7 +141,7 @@ impl Topology {
                 infinite.remove(&[a, b]);
             }
             for &h in by_vertex.lower(a) {
-                if self.upper_vertex(h) == b && self.twin[h as usize] != NONE {
+                if ends(self, h).1 == b && self.twin[h as usize] != NONE {
                     self.edge_sharpness.insert(h.min(self.twin[h as usize]), sharpness);
                     set_bit(&mut self.tagged, a);
                     set_bit(&mut self.tagged, b);
@@ -175,7 +152,7 @@ impl Topology {
         infinite
     }
 
-    fn tag_vertices(&mut self, mesh: &ControlMesh, nonmanifold: &[NonmanifoldEdge]) {
+    fn tag_vertices(&mut self, mesh: &ControlMesh, nonmanifold: &[NonmanifoldEdge], n_threads: usize) {
         for corner in &mesh.corners {
             self.set_vertex_sharpness(corner.vertex.0, clamp_sharpness(corner.sharpness));
         }
@@ -186,7 +163,7 @@ impl Topology {
                 edges_at.entry(edge.ends[1]).or_default().push(*edge);
             }
         }
-        let mut outgoing = self.spokes_of_nonmanifold_vertices(mesh, &edges_at);
+        let mut outgoing = self.spokes_of_nonmanifold_vertices(mesh, &edges_at, n_threads);
         for (v, spokes) in outgoing.drain() {
             self.tag_nonmanifold_vertex(v, &spokes, edges_at.get(&v).map_or(&[], Vec::as_slice));
         }
@@ -198,26 +175,14 @@ impl Topology {
         &mut self,
         mesh: &ControlMesh,
         edges_at: &FxHashMap<u32, Vec<NonmanifoldEdge>>,
+        n_threads: usize,
     ) -> FxHashMap<u32, Vec<u32>> {
-        let mut n_corners = vec![0u32; self.n_vertices];
-        self.vertex.iter().for_each(|v| n_corners[v.idx()] += 1);
-        let mut spokes: FxHashMap<u32, Vec<u32>> = edges_at.keys().map(|&v| (v, Vec::new())).collect();
-        for h in 0..self.vertex.len() as u32 {
-            let v = self.vertex[h as usize];
-            let n = std::mem::take(&mut n_corners[v.idx()]);
-            if n == 0 || spokes.contains_key(&v.0) {
-                continue;
-            }
-            match fan_size(self, h) {
-                (1, false) if n == 1 && mesh.boundary == BoundaryRule::EdgeAndCorner => {
-                    self.set_vertex_sharpness(v.0, f32::INFINITY);
-                }
-                (size, _) if size != n as usize => {
-                    spokes.insert(v.0, Vec::new());
-                }
-                _ => {}
-            }
+        let (corners, torn) = self.vertices_of_one_face_and_torn(edges_at, n_threads);
+        if mesh.boundary == BoundaryRule::EdgeAndCorner {
+            corners.into_iter().for_each(|v| self.set_vertex_sharpness(v, f32::INFINITY));
         }
+        let mut spokes: FxHashMap<u32, Vec<u32>> = edges_at.keys().map(|&v| (v, Vec::new())).collect();
+        spokes.extend(torn.into_iter().map(|v| (v, Vec::new())));
         if !spokes.is_empty() {
             for h in 0..self.vertex.len() as u32 {
                 if let Some(list) = spokes.get_mut(&self.vertex[h as usize].0) {
@@ -226,6 +191,37 @@ impl Topology {
             }
         }
         spokes
+    }
+
+    /// The vertices of a single face, and those whose faces do not form one fan or ring, `edges_at` aside.
+    fn vertices_of_one_face_and_torn(
+        &self,
+        edges_at: &FxHashMap<u32, Vec<NonmanifoldEdge>>,
+        n_threads: usize,
+    ) -> (Vec<u32>, Vec<u32>) {
+        let n_corners: Vec<AtomicU32> = (0..self.n_vertices).map(|_| AtomicU32::new(0)).collect();
+        for_ranges(self.vertex.len(), n_threads, |range| {
+            for v in &self.vertex[range] {
+                n_corners[v.idx()].fetch_add(1, Ordering::Relaxed);
+            }
+        });
+        let found = Mutex::new((Vec::new(), Vec::new()));
+        for_ranges(self.vertex.len(), n_threads, |range| {
+            for h in range {
+                let v = self.vertex[h];
+                // Whoever comes first looks at the vertex, from whichever half-edge: the answer is the same.
+                let n = n_corners[v.idx()].swap(0, Ordering::Relaxed);
+                if n == 0 || edges_at.contains_key(&v.0) {
+                    continue;
+                }
+                match fan_size(self, h as u32) {
+                    (1, false) if n == 1 => found.lock().0.push(v.0),
+                    (size, _) if size != n as usize => found.lock().1.push(v.0),
+                    _ => {}
+                }
+            }
+        });
+        found.into_inner()
     }
 
     fn set_vertex_sharpness(&mut self, v: u32, sharpness: f32) {
@@ -511,39 +507,5 @@ struct NonmanifoldEdge {
 impl NonmanifoldEdge {
     fn other_end(&self, v: u32) -> u32 {
         if self.ends[0] == v { self.ends[1] } else { self.ends[0] }
-    }
-}
-
-/// For each vertex, the half-edges whose smaller end it is.
-struct HalfEdgesByVertex {
-    start: Vec<u32>,
-    half_edges: Vec<u32>,
-}
-
-impl HalfEdgesByVertex {
-    fn new(topology: &Topology) -> Self {
-        let n_half_edges = topology.vertex.len() as u32;
-        let lower = |h: u32| {
-            let next = HalfEdges::next(topology, h);
-            topology.vertex[h as usize].0.min(topology.vertex[next as usize].0) as usize
-        };
-        let mut start = vec![0u32; topology.n_vertices + 2];
-        for h in 0..n_half_edges {
-            start[lower(h) + 2] += 1;
-        }
-        for v in 2..start.len() {
-            start[v] += start[v - 1];
-        }
-        let mut half_edges = vec![0u32; n_half_edges as usize];
-        for h in 0..n_half_edges {
-            let cursor = &mut start[lower(h) + 1];
-            half_edges[*cursor as usize] = h;
-            *cursor += 1;
-        }
-        Self { start, half_edges }
-    }
-
-    fn lower(&self, v: u32) -> &[u32] {
-        &self.half_edges[self.start[v as usize] as usize..self.start[v as usize + 1] as usize]
     }
 }

@@ -27,6 +27,7 @@ mod build;
 mod edits;
 mod face_index;
 mod half_edges;
+mod pairs;
 
 pub use build::{MeshCounts, Topology};
 pub use half_edges::{Fan, HalfEdges, NONE, VertexTags, fan};

@@ -1,17 +1,30 @@
-//! Boxes to wide tree: obvhs clusters them into a binary tree, `collapse.rs` makes it wide.
+//! Boxes to wide tree: `parts.rs` divides them into parts, obvhs clusters each part into a binary tree, `collapse.rs` makes
+//! that wide, and the trees of all parts become the lanes of one more tree.
+//!
+//! ```text
+//!   nodes   ┌─────────────┬──────────────────┬──────────────────┬─ ..
+//!           │ over parts  │ part 0           │ part 1           │        refs of a part count from its first node
+//!           └─────────────┴──────────────────┴──────────────────┴─ ..    until it is put in its place
+//! ```
 //!
 //! obvhs merges pairs of boxes that are each other's nearest. Among equal boxes, or along a row of equally spaced ones, one
-//! pair a round is all there is, and the time becomes quadratic. So it is given boxes that are moved a little, each by
-//! its own amount, which leaves no ties; the tree then gets the true boxes back.
+//! pair a round is all there is, and the time becomes quadratic. So it is given boxes that are moved a little along the
+//! longest axis of the whole, each by its own amount, and widened by a few lattice steps, which leaves no ties; the tree
+//! then gets the true boxes back. Across the longest axis centres stay where they are, so that what is flat stays flat: the
+//! order along the space-filling curve would be that of noise otherwise.
 
 use super::collapse::{Collapse, parents_first};
+use super::parts::divide;
 use super::{EMPTY, LANES, LEAF, TopLevel, WideNode};
 use crate::math::Bounds;
+use crate::parallel::for_each;
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
+use parking_lot::Mutex;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// Memory that [`TopLevel::build`] takes while it runs, at most, for each patch; what stays is [`TopLevel::bytes`].
@@ -22,6 +35,10 @@ const JITTER: f32 = 0.02;
 
 /// The same in lattice steps, for boxes without extent.
 const JITTER_STEPS: f32 = 1.0;
+
+/// Lattice steps by which a box becomes wider on each side, at most: whole steps, so that centres do not move. Boxes of
+/// points on a line have an area then.
+const WIDENING_STEPS: f32 = 16.0;
 
 impl WideNode {
     const NOTHING: Self = Self {
@@ -46,18 +63,81 @@ impl WideNode {
 }
 
 impl TopLevel {
-    /// The tree over `patches`: boxes in lattice units, finite, that hold every lattice vertex of the patch. At most 2^28 of them.
-    pub fn build(patches: &[Bounds]) -> Self {
+    /// The tree over `patches`: boxes in lattice units, finite, that hold every lattice vertex of the patch. At most 2^28 of
+    /// them. The same tree for any number of threads.
+    pub fn build(patches: &[Bounds], n_threads: usize) -> Self {
         if patches.is_empty() {
             return Self { nodes: vec![WideNode::NOTHING], stack_need: LANES };
         }
-        let boxes: Vec<Aabb> = patches.iter().enumerate().map(|(i, b)| jittered(i as u32, b)).collect();
+        let mut members: Vec<u32> = (0..patches.len() as u32).collect();
+        let parts = divide(patches, &mut members, n_threads);
+        if let [part] = &parts[..] {
+            return Self::of_part(patches, part.members);
+        }
+        let bounds: Vec<Bounds> = parts.iter().map(|p| p.bounds).collect();
+        let all: Vec<u32> = (0..parts.len() as u32).collect();
+        let assembly = Mutex::new(Assembly::under(Self::of_part(&bounds, &all)));
+        for_each(&parts, n_threads, |i, part| {
+            let tree = Self::of_part(patches, part.members);
+            assembly.lock().add(i, tree);
+        });
+        assembly.into_inner().finish()
+    }
+
+    /// The tree over some of `boxes`, at least one, whose leaves are `members`.
+    fn of_part(boxes: &[Bounds], members: &[u32]) -> Self {
+        let moved = without_ties(boxes, members);
         let parameters = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::very_fast_build() };
-        let mut binary = build_bvh2(&boxes, parameters, &mut Duration::default());
-        drop(boxes);
+        let mut binary = build_bvh2(&moved, parameters, &mut Duration::default());
+        binary.primitive_indices.iter_mut().for_each(|i| *i = members[*i as usize]);
         let order = parents_first(&binary);
-        restore_boxes(&mut binary, &order, patches);
+        restore_boxes(&mut binary, &order, boxes);
         emit(&binary, &Collapse::new(&binary, &order))
+    }
+}
+
+/// Trees of parts being joined, in the order of the parts, in which they do not become ready.
+struct Assembly {
+    nodes: Vec<WideNode>,
+    /// Nodes of the tree over parts, which stand first.
+    n_above: usize,
+    /// The root of each part that is in its place.
+    roots: Vec<u32>,
+    waiting: BTreeMap<usize, TopLevel>,
+    /// The most that a traversal of the tree over parts needs, and of one of theirs.
+    stack_above: usize,
+    stack_below: usize,
+}
+
+impl Assembly {
+    fn under(above: TopLevel) -> Self {
+        Self {
+            n_above: above.nodes.len(),
+            stack_above: above.stack_need,
+            nodes: above.nodes,
+            roots: Vec::new(),
+            waiting: BTreeMap::new(),
+            stack_below: 0,
+        }
+    }
+
+    fn add(&mut self, part: usize, tree: TopLevel) {
+        self.waiting.insert(part, tree);
+        while let Some(tree) = self.waiting.remove(&self.roots.len()) {
+            let root = self.nodes.len() as u32;
+            let in_place = |r: u32| if r & LEAF == 0 { r + root } else { r };
+            self.nodes.extend(tree.nodes.iter().map(|n| WideNode { refs: n.refs.map(in_place), ..*n }));
+            self.roots.push(root);
+            self.stack_below = self.stack_below.max(tree.stack_need);
+        }
+    }
+
+    fn finish(mut self) -> TopLevel {
+        let (above, _) = self.nodes.split_at_mut(self.n_above);
+        let leaves = above.iter_mut().flat_map(|n| &mut n.refs).filter(|r| **r != EMPTY && **r & LEAF != 0);
+        leaves.for_each(|r| *r = self.roots[(*r & !LEAF) as usize]);
+        self.nodes.shrink_to_fit();
+        TopLevel { nodes: self.nodes, stack_need: self.stack_above + self.stack_below }
     }
 }
 
@@ -65,15 +145,23 @@ fn aabb(b: &Bounds) -> Aabb {
     Aabb::new(Vec3A::from(b.min), Vec3A::from(b.max))
 }
 
-/// The box, moved by an amount that depends on its number.
-fn jittered(i: u32, b: &Bounds) -> Aabb {
-    let random = |salt: u32| {
-        let mixed = (i ^ salt).wrapping_mul(0x9e37_79b9).rotate_left(15).wrapping_mul(0x85eb_ca6b);
-        (mixed >> 8) as f32 / (1 << 24) as f32 - 0.5
+/// The boxes of `members`, each moved and widened by amounts that depend on its place.
+fn without_ties(boxes: &[Bounds], members: &[u32]) -> Vec<Aabb> {
+    let all = members.iter().map(|&i| boxes[i as usize]).fold(Bounds::EMPTY, Bounds::union);
+    let size = all.max - all.min;
+    let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).expect("three axes");
+    let changed = |(i, &member): (usize, &u32)| {
+        let b = boxes[member as usize];
+        let random = |salt: u32| {
+            let mixed = (i as u32 ^ salt).wrapping_mul(0x9e37_79b9).rotate_left(15).wrapping_mul(0x85eb_ca6b);
+            (mixed >> 8) as f32 / (1 << 24) as f32
+        };
+        let mut by = Vec3::ZERO;
+        by[axis] = ((b.max - b.min)[axis] * JITTER + JITTER_STEPS) * (random(1) - 0.5);
+        let wider = (WIDENING_STEPS * random(0x5bd1_e995)).ceil();
+        Aabb::new(Vec3A::from(b.min + by - wider), Vec3A::from(b.max + by + wider))
     };
-    let by = (b.max - b.min) * JITTER + JITTER_STEPS;
-    let by = by * Vec3::new(random(1), random(0x5bd1_e995), random(0x27d4_eb2f));
-    Aabb::new(Vec3A::from(b.min + by), Vec3A::from(b.max + by))
+    members.iter().enumerate().map(changed).collect()
 }
 
 /// Gives every node the box of what is below it.

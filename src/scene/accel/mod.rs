@@ -22,6 +22,7 @@
 
 mod build;
 mod collapse;
+mod parts;
 mod traverse;
 
 use crate::ids::PatchId;
@@ -68,7 +69,7 @@ const _: () = assert!(size_of::<WideNode>() == 224);
 /// use lazytess::scene::accel::{TopLevel, TraversalStack};
 ///
 /// let boxes: Vec<Bounds> = (0..100).map(|x| 1000.0 * Vec3::X * x as f32).map(|p| Bounds { min: p, max: p + 100.0 }).collect();
-/// let tree = TopLevel::build(&boxes);
+/// let tree = TopLevel::build(&boxes, 1);
 /// let ray = LatticeRay::new(DVec3::new(-50.0, 50.0, 50.0), DVec3::X, f32::INFINITY, TriangleId::NONE);
 /// let mut order = vec![];
 /// tree.closest(Portable, &ray, &mut TraversalStack::default(), |leaf, _t_max| order.push(leaf.patch.idx()));

@@ -184,7 +184,7 @@ mod tests {
         let mut mesh = shapes::cube();
         let hole = |path: &&[u32]| Edit { kind: EditKind::Face, path: path.to_vec(), value: EditValue::Hole };
         mesh.edits = paths.iter().map(hole).collect();
-        Holes::new(&mesh, &Topology::new(&mesh), |face, _| PatchId(face.0))
+        Holes::new(&mesh, &Topology::new(&mesh, 1), |face, _| PatchId(face.0))
     }
 
     #[test]
