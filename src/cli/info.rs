@@ -55,9 +55,9 @@ impl InfoArgs {
             memory: None,
         };
         let mut inventory = Inventory { input: self.input.display().to_string(), ..Default::default() };
-        let meshes = render.read_meshes(false)?;
-        meshes.iter().for_each(|mesh| inventory.add_control_mesh(mesh));
         let threads = RunArgs::available_threads();
+        let meshes = render.read_meshes(threads, false)?;
+        meshes.iter().for_each(|mesh| inventory.add_control_mesh(mesh));
         let (world, _) = render.compile(meshes, threads, false)?;
         let slots = GridCache::new(&world, CacheConfig::with_bytes(0))?.table_bytes();
         inventory.add_world(&world, slots, threads);

@@ -1,8 +1,9 @@
 //! A scene or a mesh, as the first argument of most commands.
 
 use super::PICTURE;
+use super::run_options::RunArgs;
 use crate::error::{Error, Result};
-use crate::io::obj::read_obj_within;
+use crate::io::obj::{ReadOptions, read_obj_with};
 use crate::io::scene_file::read_scene;
 use crate::mesh::ControlMesh;
 use crate::scene::description::{Rate, SceneDescription};
@@ -20,12 +21,13 @@ pub struct EditArgs {
 impl EditArgs {
     /// Reads a mesh and tells its warnings on stderr.
     pub fn load_mesh(self, path: &Path) -> Result<ControlMesh> {
-        self.load_mesh_within(path, u64::MAX)
+        let n_threads = RunArgs::available_threads();
+        self.load_mesh_with(path, &ReadOptions { limit: u64::MAX, n_threads, progress: &|_| () })
     }
 
-    /// As [`load_mesh`](Self::load_mesh), while the process has at most `limit` bytes resident.
-    pub fn load_mesh_within(self, path: &Path, limit: u64) -> Result<ControlMesh> {
-        let mut mesh = load_mesh_within(path, limit)?;
+    /// As [`load_mesh`](Self::load_mesh), with a say in how.
+    pub fn load_mesh_with(self, path: &Path, options: &ReadOptions<'_>) -> Result<ControlMesh> {
+        let mut mesh = load_mesh(path, options)?;
         if self.no_edits {
             mesh.edits.clear();
         }
@@ -43,8 +45,8 @@ pub fn load_scene(path: &Path) -> Result<SceneDescription> {
     }
 }
 
-fn load_mesh_within(path: &Path, limit: u64) -> Result<ControlMesh> {
-    let obj = read_obj_within(path, limit)?;
+fn load_mesh(path: &Path, options: &ReadOptions<'_>) -> Result<ControlMesh> {
+    let obj = read_obj_with(path, options)?;
     obj.warnings.iter().for_each(|warning| eprintln!("lazytess: warning: {warning}"));
     Ok(obj.mesh)
 }

@@ -6,6 +6,7 @@ use super::progress::Progress;
 use super::values::CacheSize;
 use crate::cache::CacheConfig;
 use crate::error::Result;
+use crate::io::obj::ReadOptions;
 use crate::io::process::{self, Stopwatch};
 use crate::mesh::ControlMesh;
 use crate::render::adaptive::render_adaptive;
@@ -20,6 +21,7 @@ use crate::scene::compile::{camera_of, compile};
 use crate::scene::description::SceneDescription;
 use crate::scene::intersect::Intersector;
 use crate::scene::world::{GridCache, World, WorldMesh};
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -55,7 +57,7 @@ impl<'a> RenderScene<'a> {
     /// Reads the meshes and prepares them.
     pub fn prepare(self, threads: usize, quiet: bool) -> Result<Prepared<'a>> {
         let watch = Stopwatch::start();
-        let meshes = self.read_meshes(quiet)?;
+        let meshes = self.read_meshes(threads, quiet)?;
         let control_faces = meshes.iter().map(ControlMesh::n_faces).sum();
         let mut seconds = PhaseSeconds { load: watch.seconds().into(), ..Default::default() };
         let watch = Stopwatch::start();
@@ -87,26 +89,33 @@ impl<'a> RenderScene<'a> {
     /// Prepares meshes that have been read, and the camera that frames them.
     pub fn compile(&self, meshes: Vec<ControlMesh>, threads: usize, quiet: bool) -> Result<(World, Camera)> {
         let camera = Camera::new(&self.camera.apply(camera_of(self.scene, &meshes))?);
-        let (progress, n) = (Progress::new("meshes prepared", quiet), meshes.len());
+        let n_faces = meshes.iter().map(ControlMesh::n_faces).sum();
+        let progress = Progress::new("faces prepared", quiet);
         let height = self.settings.size[1];
-        let world = compile(self.scene, meshes, &camera, height, threads, &mut |k| progress.set(k, n))?;
+        let world = compile(self.scene, meshes, &camera, height, threads, &|k| progress.set(k, n_faces))?;
         progress.finish();
         Ok((world, camera))
     }
 
     /// Reads all meshes.
-    pub fn read_meshes(&self, quiet: bool) -> Result<Vec<ControlMesh>> {
-        let progress = Progress::new("meshes read", quiet);
-        let n = self.scene.meshes.len();
-        let read = self.scene.meshes.iter().enumerate().map(|(i, description)| {
-            let mesh = self.edits.load_mesh_within(&description.file, self.memory.unwrap_or(u64::MAX))?;
-            progress.set(i + 1, n);
-            Ok(mesh)
+    pub fn read_meshes(&self, threads: usize, quiet: bool) -> Result<Vec<ControlMesh>> {
+        let files: Vec<&Path> = self.scene.meshes.iter().map(|m| m.file.as_path()).collect();
+        let sizes: Vec<u64> = files.iter().map(|file| file.metadata().map_or(0, |m| m.len())).collect();
+        let (progress, total) = (Progress::new("MB of meshes read", quiet), megabytes(sizes.iter().sum()));
+        let read = files.iter().enumerate().map(|(i, file)| {
+            let before: u64 = sizes[..i].iter().sum();
+            let report = |n_read| progress.set(megabytes(before + n_read), total);
+            let limit = self.memory.unwrap_or(u64::MAX);
+            self.edits.load_mesh_with(file, &ReadOptions { limit, n_threads: threads, progress: &report })
         });
         let meshes = read.collect();
         progress.finish();
         meshes
     }
+}
+
+fn megabytes(bytes: u64) -> usize {
+    bytes.div_ceil(1_000_000) as usize
 }
 
 impl Prepared<'_> {

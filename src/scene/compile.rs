@@ -31,20 +31,23 @@ fn corners(b: DBounds) -> impl Iterator<Item = DVec3> {
 }
 
 /// Prepares all meshes for tracing. Every mesh of the description must have its rate; pixels are those of a picture
-/// `height` pixels high seen through `camera`. `done` is called with the number of meshes that are ready.
+/// `height` pixels high seen through `camera`. `progress` is called with a number of control faces that are as good as ready.
 pub fn compile(
     description: &SceneDescription,
     meshes: Vec<ControlMesh>,
     camera: &Camera,
     height: u32,
     n_threads: usize,
-    done: &mut dyn FnMut(usize),
+    progress: &(dyn Fn(usize) + Sync),
 ) -> Result<World> {
     let mut compiled = Vec::with_capacity(meshes.len());
+    let mut n_before = 0;
     for (mesh_description, mesh) in description.meshes.iter().zip(meshes) {
         let rate = DicingRate::new(mesh_description.rate.unwrap_or(Rate::Pixels(1.0)), camera, height);
-        compiled.push(WorldMesh::from_description(mesh_description, mesh, rate, n_threads)?);
-        done(compiled.len());
+        let (before, n_faces) = (n_before, mesh.n_faces());
+        let report = |share: f64| progress(before + (share * n_faces as f64) as usize);
+        compiled.push(WorldMesh::from_description(mesh_description, mesh, rate, n_threads, &report)?);
+        n_before += n_faces;
     }
     Ok(World::new(compiled))
 }

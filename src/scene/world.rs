@@ -15,7 +15,7 @@ use crate::subdiv::dice::LATTICE_SHIFT;
 use crate::subdiv::{Dicer, PatchRates, Surface};
 use glam::{DAffine3, DMat3, DVec3};
 use parking_lot::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// Quarters of an irregular patch that its box looks into: more make the box tighter, and building slower.
 const BOX_DEPTH: u32 = 3;
@@ -23,6 +23,10 @@ const BOX_DEPTH: u32 = 3;
 /// Lattice steps around a mesh's box within which a ray is worth a look: rays are rounded to f32 near the mesh, which
 /// moves them by less than 48 steps.
 const REACH_MARGIN: f64 = 256.0;
+
+/// Shares of the time that preparing a large mesh takes: half-edges and plans, and the tree at the end.
+const SHARE_OF_SURFACE: f64 = 0.35;
+const SHARE_OF_TREE: f64 = 0.35;
 
 /// Bytes of the tree over a mesh's patches, for each: a node of 224 bytes for every four to five of them.
 const TREE_BYTES_PER_PATCH: usize = 50;
@@ -157,11 +161,25 @@ fn scene_box(scene_from_world: DAffine3, b: DBounds) -> Bounds {
 impl WorldMesh {
     /// Prepares a mesh for tracing on `n_threads` threads: plans, boxes and tree, but no grid.
     pub fn new(mesh: ControlMesh, world_from_object: DAffine3, rate: DicingRate, n_threads: usize) -> Result<Self> {
+        Self::prepare(mesh, world_from_object, rate, n_threads, &|_| ())
+    }
+
+    /// As [`new`](Self::new); `progress` is told which share of the work is done, now and then, from any thread.
+    pub fn prepare(
+        mesh: ControlMesh,
+        world_from_object: DAffine3,
+        rate: DicingRate,
+        n_threads: usize,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Self> {
         let surface = Surface::new(&mesh, n_threads)?;
+        progress(SHARE_OF_SURFACE);
         // The tree over ten million patches takes a gigabyte to build: polygons and positions are gone before.
         let tex_coords = mesh.into_tex_coords();
         let patches: Vec<PatchId> = surface.visible_patches().collect();
-        let boxes = patch_boxes(&surface, &patches, n_threads);
+        let boxes = patch_boxes(&surface, &patches, n_threads, &|share| {
+            progress(SHARE_OF_SURFACE + share * (1.0 - SHARE_OF_SURFACE - SHARE_OF_TREE));
+        });
         let lattice = surface.lattice();
         let object_from_world = world_from_object.inverse();
         let lattice_from_object = DAffine3::from_translation(DVec3::splat(LATTICE_SHIFT))
@@ -172,6 +190,7 @@ impl WorldMesh {
         let bounds_in_world = world_box(&surface, world_from_object, bounds);
         let reach = DBounds { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() }.expanded(REACH_MARGIN);
         let top = TopLevel::build(&boxes, n_threads);
+        progress(1.0);
         let visible = (patches.len() != surface.n_patches()).then_some(patches);
         Ok(Self {
             top,
@@ -187,14 +206,15 @@ impl WorldMesh {
         })
     }
 
-    /// As [`new`](Self::new), for a mesh of a scene file that has been read.
+    /// As [`prepare`](Self::prepare), for a mesh of a scene file that has been read.
     pub fn from_description(
         description: &MeshDescription,
         mesh: ControlMesh,
         rate: DicingRate,
         n_threads: usize,
+        progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Self> {
-        Self::new(mesh, description.world_from_object, rate, n_threads)
+        Self::prepare(mesh, description.world_from_object, rate, n_threads, progress)
             .map_err(|e| Error::input(format!("{}: {e}", description.file.display())))
     }
 
@@ -326,7 +346,13 @@ fn full_bytes(rates: &PatchRates, n_pieces: u64) -> u64 {
     vertices + 160 * n_pieces + nodes
 }
 
-fn patch_boxes(surface: &Surface, patches: &[PatchId], n_threads: usize) -> Vec<Bounds> {
+fn patch_boxes(
+    surface: &Surface,
+    patches: &[PatchId],
+    n_threads: usize,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Vec<Bounds> {
+    let n_done = AtomicUsize::new(0);
     let mut boxes = vec![Bounds::EMPTY; patches.len()];
     let chunks: Vec<_> = boxes.chunks_mut(ITEMS_PER_TASK).map(parking_lot::Mutex::new).collect();
     for_ranges(patches.len(), n_threads, |range| {
@@ -335,6 +361,8 @@ fn patch_boxes(surface: &Surface, patches: &[PatchId], n_threads: usize) -> Vec<
         for (b, patch) in chunk.iter_mut().zip(&patches[range]) {
             *b = dicer.patch_bounds(surface, *patch, BOX_DEPTH);
         }
+        let n_done = n_done.fetch_add(chunk.len(), Ordering::Relaxed) + chunk.len();
+        progress(n_done as f64 / patches.len() as f64);
     });
     drop(chunks);
     boxes

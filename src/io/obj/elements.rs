@@ -33,6 +33,13 @@ impl Reach {
         }
     }
 
+    /// As if what `later` has noted had been noted here.
+    fn append(&mut self, later: Self) {
+        if later.end > self.end {
+            *self = later;
+        }
+    }
+
     /// An error if fewer than `end` elements exist; `first` is the number of the first element in this kind of line.
     fn check(&self, what: &str, first: usize, n_there: usize, path: &Path) -> Result<()> {
         if self.end <= n_there {
@@ -166,6 +173,22 @@ impl MeshBuilder {
         self.reach_of_tags_to_faces.note(edit.path[0], self.line);
         self.edit_lines.push(self.line);
         self.mesh.edits.push(edit);
+    }
+
+    /// Adds vertices and faces of later lines, whose indices are absolute. They have no tags and no warnings.
+    pub fn append(&mut self, part: Self) {
+        self.mesh.positions.extend_from_slice(&part.mesh.positions);
+        self.mesh.face_sizes.extend_from_slice(&part.mesh.face_sizes);
+        self.mesh.face_vertices.extend_from_slice(&part.mesh.face_vertices);
+        self.tex_coords.values.extend_from_slice(&part.tex_coords.values);
+        self.some_corner_without_tex_coord |= part.some_corner_without_tex_coord;
+        if self.some_corner_without_tex_coord {
+            self.tex_coords.indices = Vec::new();
+        } else {
+            self.tex_coords.indices.extend_from_slice(&part.tex_coords.indices);
+        }
+        self.reach_of_faces.append(part.reach_of_faces);
+        self.reach_of_tex_coords.append(part.reach_of_tex_coords);
     }
 
     /// The whole mesh, checked.

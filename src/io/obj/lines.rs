@@ -3,7 +3,7 @@
 use std::io::{self, BufRead, Read};
 
 /// Longest logical line in bytes. No mesh comes near it; without a bound a device file would fill the memory.
-const MAX_LINE: usize = 1 << 28;
+pub(super) const MAX_LINE: usize = 1 << 28;
 
 /// One statement.
 #[derive(Debug, PartialEq)]
@@ -24,7 +24,12 @@ pub struct LogicalLines<R> {
 impl<R: BufRead> LogicalLines<R> {
     /// Starts at line 1.
     pub fn new(reader: R) -> Self {
-        Self { reader, buffer: Vec::new(), n_read: 0 }
+        Self::starting_at(1, reader)
+    }
+
+    /// Starts at a line whose number is known.
+    pub fn starting_at(number: usize, reader: R) -> Self {
+        Self { reader, buffer: Vec::new(), n_read: number - 1 }
     }
 
     /// The next line, or `None` at the end of the file.
@@ -38,8 +43,10 @@ impl<R: BufRead> LogicalLines<R> {
             *self.buffer.last_mut().expect("not empty") = b' ';
             self.append_physical_line()?;
         }
-        let mark: &[u8] = if number == 1 { b"\xef\xbb\xbf" } else { b"" };
-        let text = self.buffer.strip_prefix(mark).unwrap_or(&self.buffer);
+        let text = match self.buffer.strip_prefix(b"\xef\xbb\xbf") {
+            Some(text) if number == 1 => text,
+            _ => &self.buffer,
+        };
         Ok(Some(Line { number, text }))
     }
 

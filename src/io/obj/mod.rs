@@ -16,10 +16,12 @@
 //! t vertexedit | edgeedit | faceedit    hierarchical edits (RISpec 3.2), see `edits.rs`
 //! ```
 //!
-//! The file is read once, line by line: besides the mesh only one line is in memory. Why this is not a library: those
+//! The file is read once, in blocks of a megabyte that threads parse side by side (`blocks.rs`): besides the mesh only a few
+//! of them are in memory. Why this is not a library: those
 //! that read f64 renumber vertices by first use and split them at groups, so the numbers in tags no longer mean anything
 //! (`notes/dependencies.md`). The tests compare with one of them where that does not matter.
 
+mod blocks;
 mod edits;
 mod elements;
 mod lines;
@@ -44,28 +46,44 @@ pub struct ObjMesh {
     pub warnings: Vec<String>,
 }
 
-/// Reads an OBJ file.
-pub fn read_obj(path: &Path) -> Result<ObjMesh> {
-    let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
-    parse_obj(BufReader::with_capacity(1 << 16, file), path)
+/// How a file is read.
+#[derive(Clone, Copy)]
+pub struct ReadOptions<'a> {
+    /// Bytes that the process may have resident meanwhile.
+    pub limit: u64,
+    /// Threads that parse.
+    pub n_threads: usize,
+    /// Called now and then with the bytes read so far.
+    pub progress: &'a dyn Fn(u64),
 }
 
-/// As [`read_obj`], but stops as soon as the process has more than `limit` bytes resident.
+/// Reads an OBJ file on the calling thread.
+pub fn read_obj(path: &Path) -> Result<ObjMesh> {
+    read_obj_with(path, &ReadOptions { limit: u64::MAX, n_threads: 1, progress: &|_| () })
+}
+
+/// Reads an OBJ file.
 ///
 /// # Errors
-/// Then of kind [`ErrorKind::Budget`], with what the file would take if it goes on as it began.
-pub fn read_obj_within(path: &Path, limit: u64) -> Result<ObjMesh> {
+/// Of kind [`ErrorKind::Budget`] as soon as the process has more than `limit` bytes resident, with what the file would
+/// take if it goes on as it began.
+pub fn read_obj_with(path: &Path, options: &ReadOptions<'_>) -> Result<ObjMesh> {
     let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
     let length = file.metadata().map_or(0, |m| m.len());
     let (exceeded, at_start) = (Cell::new(None), resident_bytes().unwrap_or(0));
-    let watched = Watched { file, limit, n_read: 0, next_look: LOOK_EVERY, exceeded: &exceeded };
-    parse_obj(BufReader::with_capacity(1 << 16, watched), path).map_err(|error| match exceeded.get() {
+    let watched = Watched { file, options, n_read: 0, next_look: LOOK_EVERY, exceeded: &exceeded };
+    let mesh = if options.n_threads < 2 || length < 2 * blocks::BLOCK_BYTES as u64 {
+        parse_obj(BufReader::with_capacity(1 << 16, watched), path)
+    } else {
+        blocks::parse_blocks(watched, path, options.n_threads, blocks::BLOCK_BYTES)
+    };
+    mesh.map_err(|error| match exceeded.get() {
         None => error,
         Some((n_read, resident)) => {
             let so_far = resident.saturating_sub(at_start) as f64;
             let whole = at_start + (so_far * length.max(n_read) as f64 / n_read as f64) as u64;
             let part = 100 * n_read / length.max(n_read);
-            let [given, whole] = [limit >> 20, whole.div_ceil(1 << 20)];
+            let [given, whole] = [options.limit >> 20, whole.div_ceil(1 << 20)];
             let message =
                 format!("--memory {given}M is too little: {part} % of the file fill it; all of it takes {whole}M");
             Error::new(ErrorKind::Budget, message).at(path, None)
@@ -79,7 +97,7 @@ const LOOK_EVERY: u64 = 1 << 20;
 /// A file that refuses to be read on when too much memory is resident.
 struct Watched<'a> {
     file: File,
-    limit: u64,
+    options: &'a ReadOptions<'a>,
     n_read: u64,
     next_look: u64,
     /// Bytes read and bytes resident when it was too much.
@@ -90,7 +108,8 @@ impl Read for Watched<'_> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.n_read >= self.next_look {
             self.next_look += LOOK_EVERY;
-            if let Some(resident) = resident_bytes().filter(|&n| n > self.limit) {
+            (self.options.progress)(self.n_read);
+            if let Some(resident) = resident_bytes().filter(|&n| n > self.options.limit) {
                 self.exceeded.set(Some((self.n_read, resident)));
                 return Err(io::ErrorKind::OutOfMemory.into());
             }
@@ -103,13 +122,17 @@ impl Read for Watched<'_> {
 
 /// Reads OBJ text from anywhere; `path` is for messages.
 pub fn parse_obj(reader: impl BufRead, path: &Path) -> Result<ObjMesh> {
-    let mut lines = LogicalLines::new(reader);
     let mut mesh = MeshBuilder::default();
+    read_lines(&mut mesh, LogicalLines::new(reader), path)?;
+    mesh.finish(path)
+}
+
+fn read_lines(mesh: &mut MeshBuilder, mut lines: LogicalLines<impl BufRead>, path: &Path) -> Result<()> {
     while let Some(line) = lines.next_line().map_err(|e| Error::io("read", path, e))? {
         mesh.set_line(line.number);
-        read_line(&mut mesh, line.text).map_err(|m| Error::input(m).at(path, Some(line.number)))?;
+        read_line(mesh, line.text).map_err(|m| Error::input(m).at(path, Some(line.number)))?;
     }
-    mesh.finish(path)
+    Ok(())
 }
 
 /// Statements of the format that carry no polygon of ours.

@@ -226,3 +226,27 @@ fn mixed_polygons() -> String {
     let face = |f: i32| (0..3 + f % 3).map(|k| format!(" {}", word(corner(f, k)))).collect::<String>();
     vertices + &(0..40).map(|f| format!("f{}\n", face(f))).collect::<String>()
 }
+
+/// Texts that plain blocks, blocks of other kinds and ends of blocks in all places make the same mesh or error of.
+const TEXTS: [&str; 8] = [
+    "\u{feff}v 0 0 0\nv 1 0 0\r\nv 1 1 \\\n 0\nv 0 \\\r\n1 0\nf 1 2 3 4\nf 4 3 2 1\nt corner 1/1/0 2 3\n",
+    "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nv 2 2 2\nf -1 -2 -3\nbevel on\nnonsense 1\nf 1 2 4\n# end",
+    "vt 0 0\nvt 1 0\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1/1 2/2 3/1\nvt 1 1\nf 3/3 2/1 1/2\n\n\nf 1/1 2/1 3/2\n",
+    "vt 0 0\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1/1 2/1 3/1\nf 1 2 3\nf 1/1 2/1 3/1\n",
+    "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nf 1 2 7\nf 1 2 9\nf 1 2 9\nf 1 2 3\n",
+    "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nv 1 x 0\nf 1 2\n",
+    "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nf 1 2 0\nt corner 1/1\n",
+    "",
+];
+
+#[test]
+fn blocks_make_the_mesh_that_lines_make() {
+    for text in TEXTS {
+        let told = |result: Result<ObjMesh>| result.map(|m| (m.mesh, m.warnings)).map_err(|e| e.to_string());
+        let expected = told(parse(text));
+        for block_bytes in [1, 7, 16, 33, 1000] {
+            let read = blocks::parse_blocks(text.as_bytes(), Path::new("m.obj"), 2, block_bytes);
+            assert_eq!(told(read), expected, "{text:?} in blocks of {block_bytes}");
+        }
+    }
+}

@@ -28,7 +28,10 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 /// Memory that [`TopLevel::build`] takes while it runs, at most, for each patch; what stays is [`TopLevel::bytes`].
-pub const BUILD_BYTES_PER_PATCH: usize = 256;
+pub const BUILD_BYTES_PER_PATCH: usize = 8;
+
+/// Fewer than there are as a rule: room for the nodes of large trees is set aside by it.
+const PATCHES_PER_NODE: usize = 3;
 
 /// How far a box is moved at most to either side, as twice the share of its size: enough to break ties, too little to change clusters.
 const JITTER: f32 = 0.02;
@@ -76,7 +79,7 @@ impl TopLevel {
         }
         let bounds: Vec<Bounds> = parts.iter().map(|p| p.bounds).collect();
         let all: Vec<u32> = (0..parts.len() as u32).collect();
-        let assembly = Mutex::new(Assembly::under(Self::of_part(&bounds, &all)));
+        let assembly = Mutex::new(Assembly::under(Self::of_part(&bounds, &all), patches.len()));
         for_each(&parts, n_threads, |i, part| {
             let tree = Self::of_part(patches, part.members);
             assembly.lock().add(i, tree);
@@ -110,11 +113,14 @@ struct Assembly {
 }
 
 impl Assembly {
-    fn under(above: TopLevel) -> Self {
+    fn under(above: TopLevel, n_patches: usize) -> Self {
+        // Growing, or shrinking at the end, would copy and hold everything twice. What is not used is never resident.
+        let mut nodes = Vec::with_capacity(n_patches / PATCHES_PER_NODE);
+        nodes.extend_from_slice(&above.nodes);
         Self {
             n_above: above.nodes.len(),
             stack_above: above.stack_need,
-            nodes: above.nodes,
+            nodes,
             roots: Vec::new(),
             waiting: BTreeMap::new(),
             stack_below: 0,
@@ -136,7 +142,6 @@ impl Assembly {
         let (above, _) = self.nodes.split_at_mut(self.n_above);
         let leaves = above.iter_mut().flat_map(|n| &mut n.refs).filter(|r| **r != EMPTY && **r & LEAF != 0);
         leaves.for_each(|r| *r = self.roots[(*r & !LEAF) as usize]);
-        self.nodes.shrink_to_fit();
         TopLevel { nodes: self.nodes, stack_need: self.stack_above + self.stack_below }
     }
 }
