@@ -2,13 +2,14 @@
 //!
 //! `LAZYTESS_FUZZ=START..END cargo test --test fuzz_surface` tries other seeds. A failure is shrunk and printed as a test.
 
+use glam::DVec3;
 use lazytess::ids::FaceId;
 use lazytess::mesh::ControlMesh;
 use lazytess::mesh::random::{random_edits, random_mesh};
 use lazytess::mesh::shrink::{as_test, shrink};
-use lazytess::subdiv::refine::RefinedMesh;
+use lazytess::subdiv::refine::{RefinedMesh, Sample, Tangents};
 use lazytess::subdiv::surface::PatchPoints;
-use lazytess::subdiv::{Evaluator, Surface};
+use lazytess::subdiv::{Evaluator, SampleKind, Surface, SurfaceSample};
 
 /// Corners, edges, the middle, near a corner, and a place of no importance.
 const POINTS: [[f64; 2]; 9] = [
@@ -22,6 +23,11 @@ const POINTS: [[f64; 2]; 9] = [
     [0.015625, 0.03125],
     [0.8125, 0.6875],
 ];
+
+/// A billionth of the patch from corners and edges, as whole numbers of what the reference can tell apart.
+const NEAR_CORNERS: [[f64; 2]; 3] =
+    [[A_BILLIONTH, 3.0 * A_BILLIONTH], [1.0 - A_BILLIONTH, 0.0], [0.25, 1.0 - A_BILLIONTH]];
+const A_BILLIONTH: f64 = 1.0 / (1u64 << 30) as f64;
 
 /// Seeds beyond the usual ones that failed once.
 const FAILED_ONCE: [u64; 1] = [
@@ -38,31 +44,40 @@ fn seeds() -> impl Iterator<Item = u64> {
 
 #[test]
 fn diced_surface_is_the_reference_surface_on_random_meshes() {
-    seeds().for_each(|seed| assert_same(seed, random_mesh(seed)));
+    seeds().for_each(|seed| assert_same(seed, random_mesh(seed), &POINTS));
+}
+
+#[test]
+fn diced_surface_is_the_reference_surface_a_billionth_from_corners() {
+    for seed in seeds().step_by(5) {
+        let mesh = random_mesh(seed);
+        let edits = if seed % 2 == 0 { random_edits(&mesh, seed) } else { Vec::new() };
+        assert_same(seed, ControlMesh { edits, ..mesh }, &NEAR_CORNERS);
+    }
 }
 
 #[test]
 fn diced_surface_is_the_reference_surface_under_random_edits() {
     for seed in seeds() {
         let mesh = random_mesh(seed);
-        assert_same(seed, ControlMesh { edits: random_edits(&mesh, seed), ..mesh });
+        assert_same(seed, ControlMesh { edits: random_edits(&mesh, seed), ..mesh }, &POINTS);
     }
 }
 
-fn assert_same(seed: u64, mesh: ControlMesh) {
-    if difference(&mesh).is_some() {
-        let smallest = shrink(mesh, |m| difference(m).is_some());
-        let why = difference(&smallest).expect("shrinking keeps the failure");
+fn assert_same(seed: u64, mesh: ControlMesh, places: &[[f64; 2]]) {
+    if difference(&mesh, places).is_some() {
+        let smallest = shrink(mesh, |m| difference(m, places).is_some());
+        let why = difference(&smallest, places).expect("shrinking keeps the failure");
         panic!("seed {seed}: {why}\n{}", as_test(&smallest, &format!("seed_{seed}")));
     }
 }
 
 /// Where and how the two evaluations differ, if they do; a panic is a difference too.
-fn difference(mesh: &ControlMesh) -> Option<String> {
-    std::panic::catch_unwind(|| compare(mesh)).unwrap_or_else(|_| Some("a panic, see above".into()))
+fn difference(mesh: &ControlMesh, places: &[[f64; 2]]) -> Option<String> {
+    std::panic::catch_unwind(|| compare(mesh, places)).unwrap_or_else(|_| Some("a panic, see above".into()))
 }
 
-fn compare(mesh: &ControlMesh) -> Option<String> {
+fn compare(mesh: &ControlMesh, places: &[[f64; 2]]) -> Option<String> {
     let surface = Surface::new(mesh, 1).expect("the mesh is valid and small");
     let reference = RefinedMesh::from_control(mesh);
     let (mut points, mut evaluator) = (PatchPoints::default(), Evaluator::default());
@@ -75,7 +90,7 @@ fn compare(mesh: &ControlMesh) -> Option<String> {
         let face = FaceId::from(face);
         for sub in 0..if size == 4 { 1 } else { size } {
             let patch = surface.patch_of(face, sub);
-            for (uv, exact) in POINTS.iter().zip(reference.limits_at(face, sub, &POINTS)) {
+            for (uv, exact) in places.iter().zip(reference.limits_at(face, sub, places)) {
                 let hidden = surface.edited().hide_point(patch, uv[0], uv[1]);
                 if exact.is_some() == (hidden || !surface.is_visible(patch)) {
                     return Some(format!("face {face}, sub {sub}, uv {uv:?}: only one of the two has a surface"));
@@ -87,8 +102,38 @@ fn compare(mesh: &ControlMesh) -> Option<String> {
                 if distance.is_nan() || distance > tolerance {
                     return Some(format!("face {face}, sub {sub}, uv {uv:?}: {distance} away"));
                 }
+                if let Some(why) = tangents_differ(mesh, &surface, &sample, &exact, tolerance) {
+                    return Some(format!("face {face}, sub {sub}, uv {uv:?}: {why}"));
+                }
             }
         }
     }
     None
+}
+
+/// Derivatives may differ by 1e-4 of their length, or of a thousandth of the mesh's size where that is more; directions by 1e-4.
+fn tangents_differ(
+    mesh: &ControlMesh,
+    surface: &Surface,
+    sample: &SurfaceSample,
+    exact: &Sample,
+    tolerance: f64,
+) -> Option<String> {
+    let step = surface.lattice().step;
+    let (found, wanted, least) = match (sample.kind, exact.tangents) {
+        (SampleKind::Regular, Tangents::Derivatives(du, dv)) => {
+            ([step * sample.du, step * sample.dv], [du, dv], 1e3 * tolerance)
+        }
+        // Where vertices repeat, a tangent may be of no length, and its direction noise.
+        (SampleKind::Extraordinary, Tangents::Directions(..)) if repeats_a_vertex(mesh) => return None,
+        (SampleKind::Extraordinary, Tangents::Directions(du, dv)) => ([sample.du, sample.dv], [du, dv], 0.0),
+        (SampleKind::PositionOnly, Tangents::Unknown) => return None,
+        (kind, tangents) => return Some(format!("{kind:?} where the reference has {tangents:?}")),
+    };
+    let differs = |(a, b): (DVec3, DVec3)| a.distance(b) > 1e-4 * b.length().max(least);
+    std::iter::zip(found, wanted).any(differs).then(|| format!("{found:?} instead of {wanted:?}"))
+}
+
+fn repeats_a_vertex(mesh: &ControlMesh) -> bool {
+    mesh.faces().any(|face| (1..face.len()).any(|k| face[..k].contains(&face[k])))
 }

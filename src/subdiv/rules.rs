@@ -443,12 +443,16 @@ pub fn refine(rules: &RuleSet, mesh: &LocalMesh) -> Refined {
 }
 
 /// The refined vertex in the middle of a fin's sharp edge: that of a half-edge if there is one, else one of its own.
+///
+/// Every sheet has its own. Those at the target's corner come first: its fan is regular if they are its borders.
 fn fin_edge_vertex(mesh: &LocalMesh, v: u32, end: u32, edge_vertex: &[u32], origin: &mut Vec<Origin>) -> u32 {
-    let joins = |h: u32| {
-        let ends = [mesh.vertex(h), mesh.vertex(mesh.next(h))];
-        mesh.edge_sharpness(h) == f32::INFINITY && (ends == [v, end] || ends == [end, v])
+    let joins = |h: &u32| {
+        let ends = [mesh.vertex(*h), mesh.vertex(mesh.next(*h))];
+        mesh.edge_sharpness(*h) == f32::INFINITY && (ends == [v, end] || ends == [end, v])
     };
-    (0..mesh.n_half_edges() as u32).find(|&h| joins(h)).map_or_else(
+    let corner = (0..mesh.n_corners()).find(|&k| mesh.vertex(k) == v);
+    let at_corner = corner.into_iter().flat_map(|k| mesh.fan_edges(&mesh.fan(k))).map(|edge| edge.0);
+    at_corner.chain(0..mesh.n_half_edges() as u32).find(joins).map_or_else(
         || {
             origin.push(Origin::Middle([v, end]));
             origin.len() as u32 - 1
