@@ -1,9 +1,11 @@
 //! Promise 2: the surface is the limit surface, for every tag and topology.
 //!
-//! `cargo test --test limit_points -- --nocapture` prints the tables of `notes/accuracy.md`.
+//! `cargo test --test limit_points -- --nocapture` prints the tables of `notes/accuracy.md`, with Embree's errors beside where
+//! `EMBREE_PROBE` names the program `embree_probe`.
 
 mod common;
 
+use common::embree;
 use common::limit_table::{self, Errors, Point, Shape, max, percentile_99};
 use lazytess::ids::FaceId;
 use lazytess::subdiv::refine::{RefinedMesh, Sample, Tangents};
@@ -75,12 +77,14 @@ fn assert_within(results: &[(&Shape, Errors)], position: f64, derivative: f64) {
 fn print_table(title: &str, results: &[(&Shape, Errors)]) {
     println!("\n{title}\n");
     println!(
-        "| shape | position, max | 99 % | derivative, max | 99 % | direction, max | OpenSubdiv's position | at level 10 |"
+        "| shape | position, max | 99 % | derivative, max | 99 % | direction, max | OpenSubdiv's position | at level 10 \
+         | Embree's position, max | 99 % | normal, 99 % |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for (shape, e) in results {
+        let embree = embree_errors(&shape.name);
         println!(
-            "| {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {} | {} |",
+            "| {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {} | {} | {} |",
             shape.name,
             max(&e.position),
             percentile_99(&e.position),
@@ -89,6 +93,15 @@ fn print_table(title: &str, results: &[(&Shape, Errors)]) {
             max(&e.direction),
             shape.facts["diff_bfr_default"],
             shape.facts["diff_bfr"],
+            embree.join(" | "),
         );
     }
+}
+
+/// Embree's largest and 99th percentile error of positions, in diagonals, and the 99th percentile of that of normals, in radians.
+fn embree_errors(name: &str) -> [String; 3] {
+    let folder = common::shared("meshes/opensubdiv").expect("its shapes have been read");
+    let [mesh, points] = ["obj", "limit.csv"].map(|kind| folder.join(format!("{name}.{kind}")));
+    let report = embree::probe(&["accuracy", mesh.to_str().unwrap(), points.to_str().unwrap()]);
+    ["max", "p99", "normal_p99_rad"].map(|key| embree::cell(&report, |report| report[key].as_f64()))
 }

@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod brute_force;
+pub mod embree;
 pub mod limit_table;
 pub mod random;
 pub mod traced;

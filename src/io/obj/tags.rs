@@ -97,8 +97,8 @@ pub fn sharpness(word: &[u8]) -> Result<f32, String> {
 }
 
 fn creases(mesh: &mut MeshBuilder, arguments: &TagArguments) -> Result<(), String> {
-    if arguments.ints.len() < 2 {
-        return Err("a crease needs at least two vertices".to_owned());
+    if arguments.ints.len() == 1 {
+        return Err("a crease needs two vertices or more".to_owned());
     }
     for (i, edge) in arguments.ints.windows(2).enumerate() {
         mesh.crease([VertexId(edge[0]), VertexId(edge[1])], arguments.sharpness(i)?);

@@ -157,7 +157,7 @@ fn every_mistake_after_a_quad_gets_a_sentence_with_its_line() {
             "t hole 999999999999999999/999999999999999999/0 0",
             "the counts '999999999999999999/999999999999999999/0' announce",
         ),
-        ("t crease 1/1/0 0 1", "a crease needs at least two vertices"),
+        ("t crease 1/1/0 0 1", "a crease needs two vertices or more"),
         ("t crease 2/1/0 0 4 1", "vertex 4 does not exist: the file has 4, counted from 0"),
         ("t crease 2/1/0 0 -1 1", "'-1' does not exist: tags count vertices and faces from 0"),
         ("t crease 2/1/0 0 1 nan", "'nan' is no sharpness"),

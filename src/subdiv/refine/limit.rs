@@ -124,7 +124,9 @@ impl Star<'_> {
     fn crease_side(&self, first: &Sector, second: &Sector) -> Option<(DVec3, DVec3)> {
         let (v, a, c, b) = (self.position(), first.next, first.prev, second.prev);
         let across = (4.0 * (c - v) + (first.diagonal - a) + (second.diagonal - b)) / 6.0;
-        let is_whole_side = self.is_sharp(first.next_edge) && self.is_sharp(second.prev_edge);
+        // At a fin, one sharp edge may be both borders of a side, and then the other pulls at the crease from elsewhere.
+        let is_whole_side =
+            self.is_sharp(first.next_edge) && self.is_sharp(second.prev_edge) && first.next_edge != second.prev_edge;
         is_whole_side.then_some(((a - b) / 2.0, across))
     }
 
