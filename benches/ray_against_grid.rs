@@ -6,6 +6,7 @@ use divan::{Bencher, black_box};
 use glam::DVec3;
 use lazytess::grid::{CellRect, LatticeHit, LatticeRay, PieceLayout, PieceView, TriangleId};
 use lazytess::ids::PatchId;
+use lazytess::math::LatticeGrid;
 use lazytess::math::simd::{Kernel, Portable, Task, run};
 
 fn main() {
@@ -20,13 +21,14 @@ const CELLS: CellRect = CellRect { i0: 0, j0: 0, i1: 8, j1: 8 };
 struct Line([u8; 64]);
 
 /// A bump of 9x9 vertices, `width` steps wide.
-fn vertices(width: f64) -> Vec<[i32; 3]> {
+fn vertices(width: f64) -> LatticeGrid {
     let point = |i: f64, j: f64| DVec3::new(i, j, 1.5 - 0.1 * ((i - 4.0).powi(2) + (j - 3.0).powi(2))) * width / 8.0;
-    (0..81).map(|v| point(f64::from(v % 9), f64::from(v / 9)).round().as_ivec3().to_array()).collect()
+    let lattice = |v: u32| point(f64::from(v % 9), f64::from(v / 9)).round().as_ivec3().to_array();
+    LatticeGrid::from_points(&(0..81).map(lattice).collect::<Vec<_>>(), 9)
 }
 
-fn piece(vertices: &[[i32; 3]]) -> Vec<Line> {
-    let layout = PieceLayout::new(vertices, CELLS);
+fn piece(vertices: &LatticeGrid) -> Vec<Line> {
+    let layout = PieceLayout::new(vertices, CELLS, [8; 2]);
     let mut block = vec![Line([0; 64]); layout.bytes() / 64];
     layout.encode(vertices, bytemuck::cast_slice_mut(&mut block));
     block
@@ -109,7 +111,7 @@ fn encode(bencher: Bencher, width: f64) {
     let vertices = vertices(width);
     let mut block = [Line([0; 64]); 18];
     bencher.bench_local(|| {
-        let layout = PieceLayout::new(black_box(&vertices), CELLS);
+        let layout = PieceLayout::new(black_box(&vertices), CELLS, [8; 2]);
         layout.encode(&vertices, &mut bytemuck::cast_slice_mut(&mut block)[..layout.bytes()]);
     });
 }

@@ -404,7 +404,7 @@ mod tests {
             primitive: crate::math::PrimitiveRef {
                 mesh: crate::ids::MeshId(0),
                 patch: crate::ids::PatchId(0),
-                cell: 0,
+                cell: [0; 2],
                 half: 0,
             },
             face: crate::ids::FaceId(0),

@@ -10,6 +10,7 @@ use lazytess::cache::CacheConfig;
 use lazytess::check::{Incidence, LeakSettings, SeamReport, compare_seams, find_leaks};
 use lazytess::ids::MeshId;
 use lazytess::io::obj::read_obj;
+use lazytess::math::LatticeGrid;
 use lazytess::mesh::random::{random_edits, random_mesh};
 use lazytess::mesh::{ControlMesh, shapes};
 use lazytess::scene::intersect::Intersector;
@@ -90,7 +91,7 @@ fn pieces_of_a_patch_share_their_borders() {
     for (name, mesh) in all_shapes().into_iter().chain(edited) {
         let mesh = world_mesh(&mesh, DicingRate::Fixed(20));
         let mut dicer = Dicer::default();
-        let (mut whole, mut piece) = (Vec::new(), Vec::new());
+        let (mut whole, mut piece) = (LatticeGrid::default(), LatticeGrid::default());
         for patch in mesh.surface().visible_patches() {
             let rates = mesh.patch_rates(patch);
             dicer.dice(mesh.surface(), patch, &rates, [0, rates.n_u], [0, rates.n_v], &mut whole);
@@ -98,10 +99,10 @@ fn pieces_of_a_patch_share_their_borders() {
                 for i0 in (0..rates.n_u).step_by(8) {
                     let (i1, j1) = ((i0 + 8).min(rates.n_u), (j0 + 8).min(rates.n_v));
                     dicer.dice(mesh.surface(), patch, &rates, [i0, i1], [j0, j1], &mut piece);
-                    let mut vertices = piece.iter();
+                    let mut vertices = piece.points();
                     for j in j0..=j1 {
-                        let row = (j * (rates.n_u + 1) + i0) as usize;
-                        for vertex in &whole[row..=row + (i1 - i0) as usize] {
+                        for i in i0..=i1 {
+                            let vertex = whole.point(i as usize, j as usize);
                             assert_eq!(Some(vertex), vertices.next(), "{name}, {patch:?}, cells from {i0}, {j0}");
                         }
                     }

@@ -273,7 +273,7 @@ mod tests {
         assert_eq!((sound.rays, sound.leaks), (20_000, 0), "{:?}", sound.examples);
         // One triangle in some hundreds.
         let torn = report(shapes::prism(5), DicingRate::Fixed(8), 1, |hit| {
-            hit.primitive.patch == PatchId(3) && hit.primitive.cell == 3 && hit.primitive.half == 0
+            hit.primitive.patch == PatchId(3) && hit.primitive.cell == [3, 0] && hit.primitive.half == 0
         });
         assert!(torn.leaks > 20 && torn.examples.len() == MAX_EXAMPLES, "{torn:?}");
         // A crack along the borders of patches, a millionth of a patch wide.

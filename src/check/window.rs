@@ -2,6 +2,7 @@
 
 use super::incidence::SideRun;
 use crate::ids::PatchId;
+use crate::math::LatticeGrid;
 use crate::scene::world::WorldMesh;
 use crate::subdiv::dice::snapped;
 use crate::subdiv::{Dicer, PatchRates};
@@ -86,7 +87,10 @@ impl Window {
 
     /// The lattice vertices, i fastest, into `out`.
     pub fn dice(&self, mesh: &WorldMesh, dicer: &mut Dicer, out: &mut Vec<Vertex>) {
-        dicer.dice(mesh.surface(), self.patch, &self.rates, self.i, self.j, out);
+        let mut grid = LatticeGrid::default();
+        dicer.dice(mesh.surface(), self.patch, &self.rates, self.i, self.j, &mut grid);
+        out.clear();
+        out.extend(grid.points());
     }
 
     /// Whether some of the cells lie in a hole.

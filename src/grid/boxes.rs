@@ -42,7 +42,8 @@ pub(super) struct Head {
     pub lanes: [u8; 2],
     padding: [u8; 2],
     pub cells: CellRect,
-    padding_2: [u8; 4],
+    /// Cells of the whole patch along u and v.
+    pub grid: [u16; 2],
     /// Low planes of x, y, z, then high planes.
     planes: [[u8; 16]; 6],
 }
@@ -54,6 +55,27 @@ const _: () = assert!(size_of::<Head>() == HEAD_BYTES);
 pub fn lane_mask(lanes: [u8; 2]) -> u32 {
     let row = (1u32 << lanes[0].min(4)) - 1;
     (row * 0x1111) & ((1u32 << (4 * u32::from(lanes[1].min(4)))) - 1)
+}
+
+/// Boxes of sixteen lanes, one list for each axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LaneBoxes {
+    pub low: [[i32; 16]; 3],
+    pub high: [[i32; 16]; 3],
+}
+
+impl LaneBoxes {
+    /// The same box in every lane.
+    pub fn splat(b: IntegerBox) -> Self {
+        Self { low: b[0].map(|x| [x; 16]), high: b[1].map(|x| [x; 16]) }
+    }
+
+    /// Replaces a lane's box.
+    pub fn set(&mut self, lane: usize, b: IntegerBox) {
+        for (k, (low, high)) in b[0].into_iter().zip(b[1]).enumerate() {
+            (self.low[k][lane], self.high[k][lane]) = (low, high);
+        }
+    }
 }
 
 /// A box of lattice points: low and high corner, both inside.
@@ -73,24 +95,33 @@ fn step_exponent(extent: u32) -> u32 {
 }
 
 impl Head {
-    /// A head whose lane k, for every bit k of `lane_mask(lanes)`, has the box `boxes[k]`; the others are not looked at.
+    /// A head whose lane k, for every bit k of `lane_mask(lanes)`, has the box k of `boxes`; the others are not looked at.
     /// `whole` is the box around them all, with coordinates up to 2^24.
     #[inline(always)]
-    pub fn new(whole: IntegerBox, boxes: &[IntegerBox; 16], lanes: [u8; 2], cells: CellRect, format: u8) -> Self {
-        let extent: [u32; 3] = std::array::from_fn(|k| (whole[1][k] - whole[0][k]) as u32);
-        let exponent = extent.map(step_exponent);
+    pub fn new(
+        whole: IntegerBox,
+        boxes: &LaneBoxes,
+        lanes: [u8; 2],
+        cells: CellRect,
+        grid: [u16; 2],
+        format: u8,
+    ) -> Self {
         let mut planes = [[0; 16]; 6];
+        let mut exponents = [0; 3];
         for k in 0..3 {
-            let up = (1u32 << exponent[k]) - 1;
-            for lane in 0..16 {
-                // Lanes that are not used may wrap around: they are masked after every test.
-                planes[k][lane] = ((boxes[lane][0][k].wrapping_sub(whole[0][k]) as u32) >> exponent[k]) as u8;
-                let high = boxes[lane][1][k].wrapping_sub(whole[0][k]) as u32;
-                planes[k + 3][lane] = (high.wrapping_add(up) >> exponent[k]) as u8;
+            let base = whole[0][k];
+            let exponent = step_exponent((whole[1][k] - base) as u32);
+            let up = (1u32 << exponent) - 1;
+            // Lanes that are not used may wrap around: they are masked after every test.
+            for (plane, low) in planes[k].iter_mut().zip(&boxes.low[k]) {
+                *plane = ((low.wrapping_sub(base) as u32) >> exponent) as u8;
             }
+            for (plane, high) in planes[k + 3].iter_mut().zip(&boxes.high[k]) {
+                *plane = ((high.wrapping_sub(base) as u32).wrapping_add(up) >> exponent) as u8;
+            }
+            exponents[k] = exponent as u8;
         }
-        let exponent = exponent.map(|e| e as u8);
-        Self { base: whole[0], exponent, format, lanes, padding: [0; 2], cells, padding_2: [0; 4], planes }
+        Self { base: whole[0], exponent: exponents, format, lanes, padding: [0; 2], cells, grid, planes }
     }
 
     /// Makes the lane's box one that no ray meets: along the ray's longest axis it is left 255 planes before it is entered,

@@ -52,6 +52,8 @@ pub struct LatticeHit {
     pub triangle: TriangleId,
     /// Weights of the triangle's second and third vertex.
     pub barycentrics: [f32; 2],
+    /// Cells of the patch's grid along u and v.
+    pub grid: [u16; 2],
     /// The triangle's corners: lattice points, which f32 holds exactly.
     pub corners: [Vec3; 3],
 }
@@ -60,7 +62,7 @@ impl LatticeHit {
     /// No hit yet; hits beyond `t_max` will not be taken.
     #[inline(always)]
     pub fn none(t_max: f32) -> Self {
-        Self { t: t_max, triangle: TriangleId::NONE, barycentrics: [0.0; 2], corners: [Vec3::ZERO; 3] }
+        Self { t: t_max, triangle: TriangleId::NONE, barycentrics: [0.0; 2], grid: [1; 2], corners: [Vec3::ZERO; 3] }
     }
 
     /// Whether something was hit.

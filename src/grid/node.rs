@@ -1,6 +1,6 @@
 //! The node: boxes around up to 4x4 children of a patch's tree of pieces.
 
-use super::boxes::{CellRect, HEAD_BYTES, Head, IntegerBox, LaneHits, lane_mask, union};
+use super::boxes::{CellRect, HEAD_BYTES, Head, IntegerBox, LaneBoxes, LaneHits, lane_mask, union};
 use super::{LATTICE_LIMIT, LatticeRay};
 use crate::math::Bounds;
 use crate::math::simd::Kernel;
@@ -23,11 +23,11 @@ pub fn encode_node(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &
     let filled = bounds.iter().filter(|b| !b.is_empty());
     let whole = filled.map(integer_box).reduce(union).expect("a node has children");
     let lane = |c: usize| 4 * (c / n_u) + c % n_u;
-    let mut boxes = [whole; 16];
+    let mut boxes = LaneBoxes::splat(whole);
     for (c, b) in bounds.iter().enumerate().filter(|c| !c.1.is_empty()) {
-        boxes[lane(c)] = integer_box(b);
+        boxes.set(lane(c), integer_box(b));
     }
-    let mut head = Head::new(whole, &boxes, children, cells, NO_FORMAT);
+    let mut head = Head::new(whole, &boxes, children, cells, [0; 2], NO_FORMAT);
     (0..bounds.len()).filter(|&c| bounds[c].is_empty()).for_each(|c| head.turn_inside_out(lane(c)));
     out.copy_from_slice(bytemuck::bytes_of(&head));
 }

@@ -1,6 +1,8 @@
 //! The piece: up to 8x8 cells in one block of bytes.
 
-use super::boxes::{CellRect, HEAD_BYTES, Head, IntegerBox, union};
+use super::boxes::{CellRect, HEAD_BYTES, Head, IntegerBox, LaneBoxes};
+use crate::math::simd::{self, Kernel, Task};
+use crate::math::{LatticeGrid, WINDOW};
 
 /// Cells a piece can have along u and along v.
 pub const MAX_CELLS: usize = 8;
@@ -39,9 +41,11 @@ impl VertexFormat {
 ///
 /// ```
 /// use lazytess::grid::{CellRect, PieceLayout};
+/// use lazytess::math::LatticeGrid;
 ///
-/// let vertices: Vec<[i32; 3]> = (0..9 * 9).map(|v| [v % 9 * 10, v / 9 * 10, 7]).collect();
-/// let layout = PieceLayout::new(&vertices, CellRect { i0: 0, j0: 0, i1: 8, j1: 8 });
+/// let points: Vec<[i32; 3]> = (0..9 * 9).map(|v| [v % 9 * 10, v / 9 * 10, 7]).collect();
+/// let vertices = LatticeGrid::from_points(&points, 9);
+/// let layout = PieceLayout::new(&vertices, CellRect { i0: 0, j0: 0, i1: 8, j1: 8 }, [8, 8]);
 /// assert_eq!(layout.bytes(), 640); // 5 bytes a triangle
 /// let mut block = vec![0; layout.bytes()];
 /// layout.encode(&vertices, &mut block);
@@ -49,7 +53,9 @@ impl VertexFormat {
 #[derive(Clone, Copy, Debug)]
 pub struct PieceLayout {
     cells: CellRect,
+    grid: [u16; 2],
     whole: IntegerBox,
+    boxes: LaneBoxes,
     format: VertexFormat,
 }
 
@@ -61,28 +67,22 @@ fn block_bytes(lanes: [u8; 2], format: usize) -> usize {
 }
 
 impl PieceLayout {
-    /// The layout of the piece over `cells` (1 to 8 along u and v) with these vertices: (n_u + 1) (n_v + 1) lattice points, i fastest,
-    /// every |coordinate| at most 2^24.
+    /// The layout of the piece over `cells` (1 to 8 along u and v) with these vertices, every |coordinate| at most 2^24, of a
+    /// patch of `grid` cells along u and v.
     #[inline]
-    pub fn new(vertices: &[[i32; 3]], cells: CellRect) -> Self {
+    pub fn new(vertices: &LatticeGrid, cells: CellRect, grid: [u16; 2]) -> Self {
         let [n_u, n_v] = cells.size();
         debug_assert!((1..=MAX_CELLS).contains(&n_u) && (1..=MAX_CELLS).contains(&n_v));
-        assert_eq!(vertices.len(), (n_u + 1) * (n_v + 1), "a piece of {n_u} x {n_v} cells");
-        let whole = vertices.iter().fold([[i32::MAX; 3], [i32::MIN; 3]], |b, v| union(b, [*v, *v]));
+        assert_eq!(vertices.size(), [n_u + 1, n_v + 1], "a piece of {n_u} x {n_v} cells");
+        let (whole, boxes) = simd::run(BlockBoxes { vertices, lanes: lanes(cells) });
         let extent = (0..3).map(|k| (whole[1][k] - whole[0][k]) as u32).max().unwrap_or(0);
-        Self { cells, whole, format: VertexFormat::for_extent(extent) }
-    }
-
-    /// Blocks along u and v.
-    #[inline(always)]
-    fn lanes(&self) -> [u8; 2] {
-        self.cells.size().map(|n| n.div_ceil(2) as u8)
+        Self { cells, grid, whole, boxes, format: VertexFormat::for_extent(extent) }
     }
 
     /// Exact size of the block, a multiple of 64: 640 at 8x8 cells and 16 bits (5 bytes a triangle), 896 at 24 bits (7).
     #[inline]
     pub fn bytes(&self) -> usize {
-        block_bytes(self.lanes(), self.format as usize)
+        block_bytes(lanes(self.cells), self.format as usize)
     }
 
     /// How vertices are stored.
@@ -92,53 +92,118 @@ impl PieceLayout {
 
     /// Writes the block. `vertices` are those of [`Self::new`]; `out` is [`Self::bytes`] long.
     #[inline]
-    pub fn encode(&self, vertices: &[[i32; 3]], out: &mut [u8]) {
+    pub fn encode(&self, vertices: &LatticeGrid, out: &mut [u8]) {
         assert_eq!(out.len(), self.bytes(), "room for a piece");
-        let columns = 2 * usize::from(self.lanes()[0]) + 1;
-        let head = Head::new(self.whole, &self.boxes(vertices), self.lanes(), self.cells, self.format as u8);
-        out[..HEAD_BYTES].copy_from_slice(bytemuck::bytes_of(&head));
-        let rows = &mut out[HEAD_BYTES..];
-        match self.format {
-            VertexFormat::Two => self.write_rows::<2>(vertices, columns, rows),
-            VertexFormat::Three => self.write_rows::<3>(vertices, columns, rows),
-            VertexFormat::Four => self.write_rows::<4>(vertices, columns, rows),
-        }
+        simd::run(Encode { layout: self, vertices, out });
     }
+}
 
-    /// Index of vertex (i, j); beyond the last column or row, that of the last. Cells there have no area, and are never hit.
-    #[inline(always)]
-    fn vertex(&self, i: usize, j: usize) -> usize {
-        let [n_u, n_v] = self.cells.size();
-        j.min(n_v) * (n_u + 1) + i.min(n_u)
-    }
+/// Blocks along u and v.
+#[inline(always)]
+fn lanes(cells: CellRect) -> [u8; 2] {
+    cells.size().map(|n| n.div_ceil(2) as u8)
+}
 
-    /// The boxes of the blocks.
-    #[inline(always)]
-    fn boxes(&self, vertices: &[[i32; 3]]) -> [IntegerBox; 16] {
-        let mut boxes = [self.whole; 16];
-        for b in 0..usize::from(self.lanes()[1]) {
-            for a in 0..usize::from(self.lanes()[0]) {
-                let corners = (0..9).map(|c| vertices[self.vertex(2 * a + c % 3, 2 * b + c / 3)]);
-                boxes[4 * b + a] = corners.fold([[i32::MAX; 3], [i32::MIN; 3]], |b, v| union(b, [v, v]));
-            }
-        }
-        boxes
-    }
+/// The box around a piece's vertices, and those around its blocks'.
+struct BlockBoxes<'a> {
+    vertices: &'a LatticeGrid,
+    lanes: [u8; 2],
+}
 
-    /// Writes row after row: its x, its y, its z.
+// Vertices beyond the last column or row are those of the last: cells there have no area, and are never hit.
+impl Task for BlockBoxes<'_> {
+    type Output = (IntegerBox, LaneBoxes);
     #[inline(always)]
-    fn write_rows<const BYTES: usize>(&self, vertices: &[[i32; 3]], columns: usize, out: &mut [u8]) {
-        let n_rows = 2 * usize::from(self.lanes()[1]) + 1;
-        let mut places = out.chunks_exact_mut(BYTES);
-        for j in 0..n_rows {
-            for (axis, low) in self.whole[0].into_iter().enumerate() {
-                for (i, place) in (0..columns).zip(&mut places) {
-                    let offset = vertices[self.vertex(i, j)][axis] - low;
-                    place.copy_from_slice(&offset.to_le_bytes()[..BYTES]);
+    fn run<K: Kernel>(self, _: K) -> (IntegerBox, LaneBoxes) {
+        let [n_a, n_b] = self.lanes.map(usize::from);
+        let last_row = self.vertices.size()[1] - 1;
+        let mut boxes = LaneBoxes { low: [[0; 16]; 3], high: [[0; 16]; 3] };
+        let [mut lowest, mut highest] = [[i32::MAX; 3], [i32::MIN; 3]];
+        for (axis, (lowest, highest)) in lowest.iter_mut().zip(&mut highest).enumerate() {
+            for b in 0..n_b {
+                let row = |j: usize| self.vertices.window(axis, j.min(last_row));
+                let (low, high) = min_max(row(2 * b), row(2 * b + 1), row(2 * b + 2));
+                for a in 0..n_a {
+                    let least = low[2 * a].min(low[2 * a + 1]).min(low[2 * a + 2]);
+                    let greatest = high[2 * a].max(high[2 * a + 1]).max(high[2 * a + 2]);
+                    (boxes.low[axis][4 * b + a], boxes.high[axis][4 * b + a]) = (least, greatest);
+                    (*lowest, *highest) = ((*lowest).min(least), (*highest).max(greatest));
                 }
             }
         }
-        places.for_each(|place| place.fill(0));
+        ([lowest, highest], boxes)
+    }
+}
+
+/// The least and the greatest of three rows, column by column.
+#[inline(always)]
+fn min_max(a: &[i32; WINDOW], b: &[i32; WINDOW], c: &[i32; WINDOW]) -> ([i32; WINDOW], [i32; WINDOW]) {
+    let (mut low, mut high) = (*a, *a);
+    for i in 0..WINDOW {
+        low[i] = low[i].min(b[i]).min(c[i]);
+        high[i] = high[i].max(b[i]).max(c[i]);
+    }
+    (low, high)
+}
+
+/// Writes a block.
+struct Encode<'a> {
+    layout: &'a PieceLayout,
+    vertices: &'a LatticeGrid,
+    out: &'a mut [u8],
+}
+
+impl Task for Encode<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(self, _: K) {
+        let Self { layout: PieceLayout { cells, grid, whole, boxes, format }, vertices, out } = self;
+        let head = Head::new(*whole, boxes, lanes(*cells), *cells, *grid, *format as u8);
+        out[..HEAD_BYTES].copy_from_slice(bytemuck::bytes_of(&head));
+        match format {
+            VertexFormat::Two => write_rows::<2>(vertices, whole[0], lanes(*cells), out),
+            VertexFormat::Three => write_rows::<3>(vertices, whole[0], lanes(*cells), out),
+            VertexFormat::Four => write_rows::<4>(vertices, whole[0], lanes(*cells), out),
+        }
+    }
+}
+
+/// Writes row after row: its x, its y, its z.
+#[inline(always)]
+fn write_rows<const BYTES: usize>(vertices: &LatticeGrid, low: [i32; 3], lanes: [u8; 2], out: &mut [u8]) {
+    let [columns, n_rows] = lanes.map(|n| 2 * usize::from(n) + 1);
+    let last_row = vertices.size()[1] - 1;
+    let mut at = HEAD_BYTES;
+    for j in 0..n_rows {
+        for (axis, &low) in low.iter().enumerate() {
+            let mut offsets = *vertices.window(axis, j.min(last_row));
+            for x in &mut offsets {
+                *x = x.wrapping_sub(low);
+            }
+            write_row::<BYTES>(&offsets, columns, &mut out[at..]);
+            at += BYTES * columns;
+        }
+    }
+    out[at..].fill(0);
+}
+
+/// Writes the first `columns` numbers and, where there is room, what comes after them: the next row will replace it.
+#[inline(always)]
+fn write_row<const BYTES: usize>(offsets: &[i32; WINDOW], columns: usize, out: &mut [u8]) {
+    if BYTES == 2 {
+        let mut narrow = [0u16; WINDOW];
+        for (narrow, x) in narrow.iter_mut().zip(offsets) {
+            *narrow = (*x as u16).to_le();
+        }
+        let bytes: &[u8; 2 * WINDOW] = bytemuck::cast_ref(&narrow);
+        match out.first_chunk_mut() {
+            Some(whole) => *whole = *bytes,
+            None => out[..2 * columns].copy_from_slice(&bytes[..2 * columns]),
+        }
+        return;
+    }
+    for (x, place) in offsets[..columns].iter().zip(out.chunks_exact_mut(BYTES)) {
+        place.copy_from_slice(&x.to_le_bytes()[..BYTES]);
     }
 }
 

@@ -34,8 +34,8 @@ const START_LIMIT: f64 = 33_554_432.0;
 /// `step_inv` but for the rounding of `inv` itself, and o rounded to f32, by u |o|. The errors, as distances along the axis, are at most 3 u D in the
 /// first case; in the second at most 2 u q step + 3 u |base - o| + u |sum| <= 8 u D, for no box is wider than 2 D.
 ///
-/// All are covered by moving the near planes towards the origin and the far planes away from it by `slack` = 20 u `reach` >= 17 u `reach`; this
-/// is done once per ray, in `near_origin` and `far_origin`, rounded outwards. In a coordinate system of 2^24 steps, slack is 60 steps at most.
+/// All are covered by moving the near planes towards the origin and the far planes away from it by `slack` = 20 u `reach`; this
+/// is done once per ray, in `near_origin` and `far_origin`, whose rounding takes 2 u `reach` of it at most: 18 u `reach` >= 17 u `reach`. In a coordinate system of 2^24 steps, slack is 60 steps at most.
 ///
 /// *Zero components* have `inv` = +-2^96, by sign. Where the origin is inside a widened slab, the distance to its planes is at least 2 u `reach`, times 2^96: beyond
 /// any t; where it is outside, the entry is beyond any t likewise. No operation on finite boxes gives infinity or NaN.
@@ -70,6 +70,7 @@ impl LatticeRay {
     /// ([`TriangleId::NONE`]: every triangle can be).
     ///
     /// The direction may have any length. If it is zero, or anything is not finite (but for `t_max`), the ray hits nothing.
+    #[inline(always)]
     pub fn new(origin: DVec3, direction: DVec3, t_max: f32, skip: TriangleId) -> Self {
         let largest = direction.abs().max_element();
         let is_valid = largest > 0.0 && direction.is_finite() && origin.is_finite() && t_max >= 0.0;
@@ -83,23 +84,22 @@ impl LatticeRay {
         Self::from_start(origin + t_start * scaled, scaled, t_end, skip, t_start, t_unit)
     }
 
+    #[inline(always)]
     fn from_start(start: DVec3, scaled: DVec3, t_max: f32, skip: TriangleId, t_start: f64, t_unit: f64) -> Self {
-        let direction = scaled.to_array().map(without_dust);
-        let cell = start.round();
+        let direction = [without_dust(scaled.x), without_dust(scaled.y), without_dust(scaled.z)];
+        let [(cell_x, x), (cell_y, y), (cell_z, z)] = [split(start.x), split(start.y), split(start.z)];
         let origin = start.as_vec3();
         let slack = (origin.abs().max_element() + LATTICE_LIMIT) * SLACK;
-        let origin = origin.to_array();
-        let is_negative = direction.map(|d| usize::from(d.is_sign_negative()));
-        let forward = direction.map(|d| slack.copysign(d));
+        let forward = [slack.copysign(direction[0]), slack.copysign(direction[1]), slack.copysign(direction[2])];
         let axes = shear_axes(direction);
-        let [dx, dy, dz] = axes.map(|k| direction[k]);
+        let [dx, dy, dz] = [direction[axes[0]], direction[axes[1]], direction[axes[2]]];
         Self {
-            cell: cell.as_ivec3().to_array(),
-            fraction: (start - cell).as_vec3().to_array(),
-            near_origin: std::array::from_fn(|k| moved(origin[k], forward[k])),
-            far_origin: std::array::from_fn(|k| moved(origin[k], -forward[k])),
-            inv: direction.map(|d| if d == 0.0 { f32::powi(2.0, 96).copysign(d) } else { 1.0 / d }),
-            is_negative,
+            cell: [cell_x, cell_y, cell_z],
+            fraction: [x, y, z],
+            near_origin: [origin.x + forward[0], origin.y + forward[1], origin.z + forward[2]],
+            far_origin: [origin.x - forward[0], origin.y - forward[1], origin.z - forward[2]],
+            inv: [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])],
+            is_negative: [is_negative(direction[0]), is_negative(direction[1]), is_negative(direction[2])],
             axes,
             shear: [dx / dz, dy / dz, 1.0 / dz],
             t_max,
@@ -136,25 +136,48 @@ impl LatticeRay {
 }
 
 /// The power of two p with p <= x < 2p, for a positive normal x; the smallest normal number for a subnormal one.
+#[inline(always)]
 fn power_of_two_below(x: f64) -> f64 {
     f64::from_bits(x.to_bits() & 0x7ff0_0000_0000_0000).max(f64::MIN_POSITIVE)
 }
 
-/// `x` + `step`, rounded away from `x`.
-fn moved(x: f32, step: f32) -> f32 {
-    if step > 0.0 { (x + step).next_up() } else { (x + step).next_down() }
+/// The whole number nearest to a coordinate (one of two at ties), and what is left, exact in f64 and rounded to f32.
+#[inline(always)]
+fn split(x: f64) -> (i32, f32) {
+    // In this range doubles are whole numbers, so that the sum is rounded to one.
+    const TO_WHOLE: f64 = 6_755_399_441_055_744.0;
+    let whole = (x + TO_WHOLE) - TO_WHOLE;
+    (whole as i32, (x - whole) as f32)
+}
+
+/// 1 / d, finite.
+#[inline(always)]
+fn inverse(d: f32) -> f32 {
+    const GREATEST: f32 = 7.922_816_3e28;
+    if d == 0.0 { GREATEST.copysign(d) } else { 1.0 / d }
+}
+
+#[inline(always)]
+fn is_negative(d: f32) -> usize {
+    (d.to_bits() >> 31) as usize
 }
 
 /// Rounded to f32, with the sign of the zero kept, and zero below 2^-64.
+#[inline(always)]
 fn without_dust(d: f64) -> f32 {
-    if d.abs() < f64::powi(2.0, -64) { 0.0f32.copysign(d as f32) } else { d as f32 }
+    const DUST: f64 = 5.421_010_862_427_522e-20;
+    if d.abs() < DUST { 0.0f32.copysign(d as f32) } else { d as f32 }
 }
 
 /// Where along the ray to start: 0 from within the start cube, else where it enters; `None` if it does not.
+#[inline(always)]
 fn start(origin: DVec3, direction: DVec3) -> Option<f64> {
-    if origin.abs().max_element() <= START_LIMIT {
-        return Some(0.0);
-    }
+    if origin.abs().max_element() <= START_LIMIT { Some(0.0) } else { start_at_cube(origin, direction) }
+}
+
+/// Where a ray from outside enters the start cube.
+#[cold]
+fn start_at_cube(origin: DVec3, direction: DVec3) -> Option<f64> {
     let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
     for (o, d) in origin.to_array().into_iter().zip(direction.to_array()) {
         if d == 0.0 && o.abs() > START_LIMIT {
@@ -168,8 +191,9 @@ fn start(origin: DVec3, direction: DVec3) -> Option<f64> {
 }
 
 /// The axes x, y, z of the sheared space for a direction.
+#[inline(always)]
 fn shear_axes(direction: [f32; 3]) -> [usize; 3] {
-    let [x, y, z] = direction.map(f32::abs);
+    let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
     let axis = if x >= y && x >= z {
         0
     } else if y >= z {

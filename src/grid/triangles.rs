@@ -27,6 +27,7 @@ impl PieceView<'_> {
         let is_nearer = hit.triangle != before;
         if is_nearer {
             hit.corners = self.corners(hit.triangle);
+            hit.grid = self.head.grid;
         }
         is_nearer
     }

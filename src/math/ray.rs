@@ -10,8 +10,8 @@ pub struct PrimitiveRef {
     pub mesh: MeshId,
     /// Which patch of it.
     pub patch: PatchId,
-    /// Cell of the patch's grid: `j * n_u + i` for cell (i, j) counted from corner 0, n_u cells along u.
-    pub cell: u32,
+    /// Cell (i, j) of the patch's grid, counted along u and v from corner 0.
+    pub cell: [u16; 2],
     /// 0: the triangle at the cell's corner (0,0); 1: the one at (1,1).
     pub half: u8,
 }

@@ -52,7 +52,7 @@ impl Intersect for AnalyticTracer {
         };
         let nearest = self.shapes.iter().enumerate().filter_map(meet).min_by(|a, b| a.1.total_cmp(&b.1));
         let (i, t) = nearest.filter(|&(_, t)| t <= f64::from(ray.t_max))?;
-        let primitive = PrimitiveRef { mesh: MeshId::from(i), patch: PatchId(0), cell: 0, half: 0 };
+        let primitive = PrimitiveRef { mesh: MeshId::from(i), patch: PatchId(0), cell: [0; 2], half: 0 };
         let normal_in_object = self.shapes[i].normal(ray.origin + t * ray.direction);
         let (face, on_triangle) = (FaceId(0), OnTriangle::default());
         Some(Hit { t: t as f32, primitive, face, sub: 0, u: 0.5, v: 0.5, normal_in_object, on_triangle })

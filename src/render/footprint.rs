@@ -15,7 +15,7 @@
 use super::patches::PatchNumbers;
 use super::settings::RenderSettings;
 use super::tiles::PixelRect;
-use crate::ids::{MeshId, PatchId};
+use crate::ids::PatchId;
 use crate::math::Bounds;
 use crate::scene::camera::Camera;
 use crate::scene::world::{World, WorldMesh};
@@ -100,14 +100,13 @@ impl Footprints {
             size: settings.size,
             blocks: [columns, rows],
             dicer: Dicer::default(),
-            mesh: None,
             cosines: Vec::new(),
             found: Vec::new(),
         };
         let parts = numbers.for_each(world, threads, new, |projector, mesh, patch| {
             if n_footprints.load(Ordering::Relaxed) <= limit {
                 let before = projector.found.len();
-                projector.patch(&meshes[mesh.idx()], world.mesh(mesh), mesh, patch, numbers.number(mesh, patch));
+                projector.patch(&meshes[mesh.idx()], world.mesh(mesh), patch, numbers.number(mesh, patch));
                 n_footprints.fetch_add(projector.found.len() - before, Ordering::Relaxed);
             }
         });
@@ -217,7 +216,6 @@ struct Projector<'a> {
     size: [u32; 2],
     blocks: [u32; 2],
     dicer: Dicer,
-    mesh: Option<MeshId>,
     /// Cosine between the normal and the direction to the eye at the corners of parts; NaN where there is no normal.
     cosines: Vec<f64>,
     found: Vec<(u32, Footprint)>,
@@ -232,10 +230,7 @@ struct ScreenBox {
 }
 
 impl Projector<'_> {
-    fn patch(&mut self, view: &MeshView, mesh: &WorldMesh, id: MeshId, patch: PatchId, number: u32) {
-        if self.mesh.replace(id) != Some(id) {
-            self.dicer.forget();
-        }
+    fn patch(&mut self, view: &MeshView, mesh: &WorldMesh, patch: PatchId, number: u32) {
         let rates = mesh.patch_rates(patch);
         let Some(whole) = self.part_box(view, mesh, patch, &rates, [0, rates.n_u], [0, rates.n_v]) else { return };
         if self.pixels(&whole).is_none() {

@@ -10,7 +10,7 @@
 use super::patches::PatchNumbers;
 use super::settings::RenderSettings;
 use crate::error::{Error, Result};
-use crate::ids::{MeshId, PatchId};
+use crate::ids::PatchId;
 use crate::scene::camera::Camera;
 use crate::scene::world::{World, WorldMesh};
 use crate::subdiv::Dicer;
@@ -37,7 +37,6 @@ struct Rasteriser<'a> {
     size: [u32; 2],
     facets: u32,
     dicer: Dicer,
-    mesh: Option<MeshId>,
     /// View-space vertices of the proxy at work.
     vertices: Vec<DVec3>,
 }
@@ -57,12 +56,11 @@ impl ItemBuffer {
             size: settings.size,
             facets,
             dicer: Dicer::default(),
-            mesh: None,
             vertices: Vec::new(),
         };
         numbers.for_each(world, threads, new, |rasteriser, mesh, patch| {
             let first_item = numbers.number(mesh, patch) * facets * facets;
-            rasteriser.patch(world.mesh(mesh), mesh, patch, first_item);
+            rasteriser.patch(world.mesh(mesh), patch, first_item);
         });
         Ok(buffer)
     }
@@ -96,10 +94,7 @@ impl ItemBuffer {
 }
 
 impl Rasteriser<'_> {
-    fn patch(&mut self, mesh: &WorldMesh, id: MeshId, patch: PatchId, first_item: u32) {
-        if self.mesh.replace(id) != Some(id) {
-            self.dicer.forget();
-        }
+    fn patch(&mut self, mesh: &WorldMesh, patch: PatchId, first_item: u32) {
         self.evaluate(mesh, patch);
         let n = self.facets as usize;
         for j in 0..n {

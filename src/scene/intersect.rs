@@ -13,9 +13,10 @@ use crate::grid::{
     encode_node, is_node,
 };
 use crate::ids::{MeshId, PatchId};
+use crate::math::LatticeGrid;
 use crate::math::simd::{self, Kernel, Task};
 use crate::math::{Bounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
-use crate::subdiv::{Dicer, PatchRates, Surface};
+use crate::subdiv::{Dicer, PatchRates};
 use glam::DVec3;
 
 /// Children of a node along u and v.
@@ -30,7 +31,8 @@ pub struct Intersector<'w> {
     cache: &'w GridCache,
     pin: Pin<'w>,
     builder: Builder<'w>,
-    shading: NormalScratch,
+    /// Remembers other patches than the builder's: those that shading asks about.
+    shading: Dicer,
     stacks: Stacks,
 }
 
@@ -38,41 +40,14 @@ pub struct Intersector<'w> {
 #[derive(Default)]
 struct Builder<'w> {
     dicer: Dicer,
-    vertices: Vec<[i32; 3]>,
+    vertices: LatticeGrid,
     boxes: Vec<Bounds>,
-    /// The mesh that `dicer` remembers a patch of.
-    mesh: Option<MeshId>,
     n_built: u64,
     n_pieces: u64,
     n_triangles: u64,
     costs: BuildCosts,
     /// Notes every block that is asked for, if the cache wants to know.
     recorder: Option<Recorder<'w>>,
-}
-
-/// Patches that shading remembers: camera rays, and rays mirrored or bounced, come back to the same few for a while.
-const NORMAL_LANES: usize = 16;
-
-/// Evaluates normals; remembers patches, one in each lane.
-#[derive(Default)]
-struct NormalScratch {
-    lanes: [NormalLane; NORMAL_LANES],
-}
-
-#[derive(Default)]
-struct NormalLane {
-    dicer: Dicer,
-    mesh: Option<MeshId>,
-}
-
-impl NormalScratch {
-    fn normal(&mut self, surface: &Surface, mesh: MeshId, patch: PatchId, u: f64, v: f64) -> DVec3 {
-        let lane = &mut self.lanes[patch.idx() % NORMAL_LANES];
-        if lane.mesh.replace(mesh) != Some(mesh) {
-            lane.dicer.forget();
-        }
-        lane.dicer.normal(surface, patch, u, v)
-    }
 }
 
 #[derive(Default)]
@@ -141,16 +116,13 @@ impl Builder<'_> {
         };
         self.n_built += 1;
         self.costs.add(of.id, of.patch, 1);
-        if self.mesh.replace(of.id) != Some(of.id) {
-            self.dicer.forget();
-        }
         let rates = of.mesh.patch_rates(of.patch);
         let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
         if cells.size().iter().all(|&n| n <= MAX_CELLS) {
             self.dicer.dice(of.mesh.surface(), of.patch, &rates, i, j, &mut self.vertices);
             self.n_pieces += 1;
             self.n_triangles += 2 * cells.size().iter().product::<usize>() as u64;
-            let layout = PieceLayout::new(&self.vertices, cells);
+            let layout = PieceLayout::new(&self.vertices, cells, [rates.n_u as u16, rates.n_v as u16]);
             let vertices = &self.vertices;
             return ticket
                 .publish(BlockLayout { bytes: layout.bytes(), children: 0 }, |out| layout.encode(vertices, out));
@@ -244,18 +216,21 @@ impl<'v> Level<'v> {
 struct ClosestInMesh<'a, 'w> {
     tracer: &'a mut Intersector<'w>,
     mesh: MeshId,
-    ray: &'a LatticeRay,
-    hit: &'a mut LatticeHit,
+    ray: &'a Ray,
+    t_max: f32,
 }
 
 impl Task for ClosestInMesh<'_, '_> {
-    type Output = ();
+    /// The hit, and its distance as the caller counts it.
+    type Output = Option<(LatticeHit, f32)>;
 
     #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) {
-        let Self { tracer, mesh: id, ray, hit } = self;
+    fn run<K: Kernel>(self, kernel: K) -> Self::Output {
+        let Self { tracer, mesh: id, ray, t_max } = self;
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
+        let ray = &lattice_ray(mesh, id, ray, t_max)?;
+        let hit = &mut LatticeHit::none(ray.t_max());
         let table = cache.table(id);
         let visit = pin.visit();
         let mut walk = mesh.top().walk(&mut stacks.mesh);
@@ -266,7 +241,23 @@ impl Task for ClosestInMesh<'_, '_> {
             let root = builder.fetch_root(&visit, slot, of, cache, leaf.slot);
             closest_in_patch(kernel, builder, &visit, root, of, ray, hit);
         }
+        hit.is_some().then(|| (*hit, ray.caller_t(hit.t)))
     }
+}
+
+/// The ray as the mesh's lattice sees it. `t` keeps its meaning. `None` if it misses the mesh's box.
+#[inline(always)]
+fn lattice_ray(mesh: &WorldMesh, id: MeshId, ray: &Ray, t_max: f32) -> Option<LatticeRay> {
+    let to = mesh.lattice_from_world();
+    let (origin, direction) = (to.transform_point3(ray.origin), to.transform_vector3(ray.direction));
+    if !mesh.is_in_reach(origin, direction) {
+        return None;
+    }
+    let skip = match ray.from {
+        Some(from) if from.mesh == id => triangle_id(&from),
+        _ => TriangleId::NONE,
+    };
+    Some(LatticeRay::new(origin, direction, t_max, skip))
 }
 
 #[inline(always)]
@@ -307,7 +298,7 @@ fn closest_in_patch<K: Kernel>(
 struct OccludedInMesh<'a, 'w> {
     tracer: &'a mut Intersector<'w>,
     mesh: MeshId,
-    ray: &'a LatticeRay,
+    ray: &'a Ray,
 }
 
 impl Task for OccludedInMesh<'_, '_> {
@@ -318,6 +309,7 @@ impl Task for OccludedInMesh<'_, '_> {
         let Self { tracer, mesh: id, ray } = self;
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
+        let Some(ray) = &lattice_ray(mesh, id, ray, ray.t_max) else { return false };
         let table = cache.table(id);
         let visit = pin.visit();
         let mut walk = mesh.top().walk(&mut stacks.mesh);
@@ -376,7 +368,7 @@ impl<'w> Intersector<'w> {
             cache,
             pin,
             builder: Builder { recorder: cache.trace().map(TraceLog::recorder), ..Default::default() },
-            shading: NormalScratch::default(),
+            shading: Dicer::default(),
             stacks: Stacks::default(),
         }
     }
@@ -394,35 +386,15 @@ impl<'w> Intersector<'w> {
     /// The limit surface's normal at a hit, in object space, along du x dv and not normalised; zero where there is none.
     pub fn limit_normal(&mut self, hit: &Hit) -> DVec3 {
         let surface = self.world.mesh(hit.primitive.mesh).surface();
-        self.shading.normal(surface, hit.primitive.mesh, hit.primitive.patch, f64::from(hit.u), f64::from(hit.v))
+        self.shading.normal(surface, hit.primitive.patch, f64::from(hit.u), f64::from(hit.v))
     }
 
-    /// The ray as the mesh's lattice sees it. `t` keeps its meaning.
-    /// `None` if it misses the mesh's box.
-    #[inline(always)]
-    fn lattice_ray(&self, mesh: MeshId, ray: &Ray, t_max: f32) -> Option<LatticeRay> {
-        let to = self.world.mesh(mesh).lattice_from_world();
-        let (origin, direction) = (to.transform_point3(ray.origin), to.transform_vector3(ray.direction));
-        if !self.world.mesh(mesh).is_in_reach(origin, direction) {
-            return None;
-        }
-        let skip = match ray.from {
-            Some(from) if from.mesh == mesh => triangle_id(self.world, &from),
-            _ => TriangleId::NONE,
-        };
-        Some(LatticeRay::new(origin, direction, t_max, skip))
-    }
-
+    #[inline]
     fn closest_in_mesh(&mut self, mesh: MeshId, ray: &Ray, best: &mut Option<Hit>) {
         let t_max = best.map_or(ray.t_max, |hit| hit.t);
-        let Some(lattice_ray) = self.lattice_ray(mesh, ray, t_max) else { return };
-        let mut found = LatticeHit::none(lattice_ray.t_max());
-        simd::run(ClosestInMesh { tracer: self, mesh, ray: &lattice_ray, hit: &mut found });
-        if found.is_some() {
-            let t = lattice_ray.caller_t(found.t);
-            if best.is_none_or(|b| t < b.t || (t == b.t && mesh < b.primitive.mesh)) {
-                *best = Some(self.hit(mesh, t, &found));
-            }
+        let Some((found, t)) = simd::run(ClosestInMesh { tracer: self, mesh, ray, t_max }) else { return };
+        if best.is_none_or(|b| t < b.t || (t == b.t && mesh < b.primitive.mesh)) {
+            *best = Some(self.hit(mesh, t, &found));
         }
     }
 
@@ -436,30 +408,30 @@ impl<'w> Intersector<'w> {
     fn hit(&self, id: MeshId, t: f32, found: &LatticeHit) -> Hit {
         let mesh = self.world.mesh(id);
         let patch = found.triangle.patch();
-        let rates = mesh.patch_rates(patch);
         let [u, v] = found.in_cells();
+        let [n_u, n_v] = found.grid.map(f32::from);
         let (face, sub) = mesh.surface().face_of(patch);
         Hit {
             t,
             primitive: PrimitiveRef {
                 mesh: id,
                 patch,
-                cell: found.triangle.j() * rates.n_u + found.triangle.i(),
+                cell: [found.triangle.i() as u16, found.triangle.j() as u16],
                 half: found.triangle.half() as u8,
             },
             face,
             sub,
-            u: u / rates.n_u as f32,
-            v: v / rates.n_v as f32,
+            u: u / n_u,
+            v: v / n_v,
             normal_in_object: found.normal() * mesh.surface().lattice().step.powi(2),
             on_triangle: OnTriangle { corners: found.corners, weights: found.barycentrics },
         }
     }
 }
 
-fn triangle_id(world: &World, of: &PrimitiveRef) -> TriangleId {
-    let n_u = world.mesh(of.mesh).patch_rates(of.patch).n_u;
-    TriangleId::new(of.patch, of.cell % n_u, of.cell / n_u, u32::from(of.half))
+fn triangle_id(of: &PrimitiveRef) -> TriangleId {
+    let [i, j] = of.cell.map(u32::from);
+    TriangleId::new(of.patch, i, j, u32::from(of.half))
 }
 
 impl Drop for Intersector<'_> {
@@ -490,10 +462,7 @@ impl Intersect for Intersector<'_> {
     }
 
     fn occluded(&mut self, ray: &Ray) -> bool {
-        let occluded_by = |tracer: &mut Self, mesh: MeshId| {
-            let lattice_ray = tracer.lattice_ray(mesh, ray, ray.t_max);
-            lattice_ray.is_some_and(|ray| simd::run(OccludedInMesh { tracer, mesh, ray: &ray }))
-        };
+        let occluded_by = |tracer: &mut Self, mesh: MeshId| simd::run(OccludedInMesh { tracer, mesh, ray });
         if self.world.meshes().len() == 1 {
             return occluded_by(self, MeshId(0));
         }

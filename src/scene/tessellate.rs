@@ -2,6 +2,7 @@
 
 use super::world::WorldMesh;
 use crate::ids::PatchId;
+use crate::math::LatticeGrid;
 use crate::subdiv::{Dicer, PatchRates};
 use glam::{DVec3, IVec3};
 use rustc_hash::FxHashMap;
@@ -44,6 +45,7 @@ pub fn tessellate<E>(
 #[derive(Default)]
 pub struct PatchGrid {
     dicer: Dicer,
+    grid: LatticeGrid,
     /// `(n_u + 1) (n_v + 1)` lattice points.
     pub vertices: Vec<[i32; 3]>,
 }
@@ -52,7 +54,9 @@ impl PatchGrid {
     /// Dices a whole patch.
     pub fn dice(&mut self, mesh: &WorldMesh, patch: PatchId, rates: &PatchRates) {
         let (i, j) = ([0, rates.n_u], [0, rates.n_v]);
-        self.dicer.dice(mesh.surface(), patch, rates, i, j, &mut self.vertices);
+        self.dicer.dice(mesh.surface(), patch, rates, i, j, &mut self.grid);
+        self.vertices.clear();
+        self.vertices.extend(self.grid.points());
     }
 }
 

@@ -13,7 +13,7 @@
 use super::eval::{Evaluator, Point, SurfaceSample};
 use super::surface::{PatchPoints, Surface};
 use crate::ids::{FaceId, PatchId};
-use crate::math::Bounds;
+use crate::math::{Bounds, LatticeGrid, Rounding};
 use crate::topology::HalfEdges;
 use glam::{DVec3, Vec3};
 
@@ -64,16 +64,11 @@ impl Surface {
     /// The rates of a patch, from `rate(a, b)`: the segments for an edge between two points of object space, symmetric in
     /// them. Edges beside a polygon that is no quad are cut evenly, since the polygon's patches meet in their middle.
     pub fn patch_rates(&self, patch: PatchId, rate: &impl Fn(DVec3, DVec3) -> u32) -> PatchRates {
-        let (face, sub) = self.face_of(patch);
-        let (first, n) = self.topology().face_corners(face.0);
-        if n == 4 {
-            let sides = std::array::from_fn(|k| self.edge_rate(first + k as u32, rate));
-            return PatchRates::new(sides, self.edited().cell_unit(patch));
-        }
-        let before = (sub + n - 1) % n;
-        let half = |k: u32| self.edge_rate(first + k, rate) / 2;
-        let inner = |k: u32| self.inner_rate(face, k, rate);
-        PatchRates::new([half(sub), inner(sub), inner(before), half(before)], self.edited().cell_unit(patch))
+        let end = |h: u32| self.object_point(self.topology().vertex(h));
+        self.rates_by(patch, &|h| rate(end(h), end(self.topology().next(h))), &|face, k| {
+            let [a, b] = self.inner_edge(face, k);
+            rate(a, b)
+        })
     }
 
     /// [`patch_rates`](Self::patch_rates) for the same rate everywhere.
@@ -81,23 +76,39 @@ impl Surface {
         if self.topology().all_quads() && !self.edited().has_holes() {
             return PatchRates::new([n.clamp(1, MAX_RATE); 4], 1);
         }
-        self.patch_rates(patch, &|_, _| n)
+        self.rates_by(patch, &|_| n, &|_, _| n)
     }
 
-    fn edge_rate(&self, h: u32, rate: &impl Fn(DVec3, DVec3) -> u32) -> u32 {
-        let [a, b] = [h, self.topology().next(h)].map(|h| self.object_point(self.topology().vertex(h)));
+    /// The rates of a patch from those of half-edges, and of twice the way from the middle of edge k of a polygon to its
+    /// centre.
+    fn rates_by(&self, patch: PatchId, edge: &impl Fn(u32) -> u32, inner: &impl Fn(FaceId, u32) -> u32) -> PatchRates {
+        let (face, sub) = self.face_of(patch);
+        let (first, n) = self.topology().face_corners(face.0);
+        let unit = self.edited().cell_unit(patch);
+        let edge = |k: u32| self.edge_rate(first + k, edge(first + k));
+        if n == 4 {
+            return PatchRates::new([edge(0), edge(1), edge(2), edge(3)], unit);
+        }
+        let inner = |k: u32| {
+            let whole = inner(face, k).clamp(1, MAX_RATE);
+            round_up(whole.div_ceil(2), self.edited().inner_unit(face))
+        };
+        let before = (sub + n - 1) % n;
+        PatchRates::new([edge(sub) / 2, inner(sub), inner(before), edge(before) / 2], unit)
+    }
+
+    fn edge_rate(&self, h: u32, rate: u32) -> u32 {
         let halves = if self.topology().touches_polygon(h) { 2 } else { 1 };
-        round_up(rate(a, b).clamp(1, MAX_RATE), halves.max(self.edited().edge_unit(self.topology(), h)))
+        round_up(rate.clamp(1, MAX_RATE), halves.max(self.edited().edge_unit(self.topology(), h)))
     }
 
-    /// The rate from the middle of edge `k` of a polygon to its centre: half that of twice the way.
-    fn inner_rate(&self, face: FaceId, k: u32, rate: &impl Fn(DVec3, DVec3) -> u32) -> u32 {
+    /// From the middle of edge `k` of a polygon through its centre, as far again.
+    fn inner_edge(&self, face: FaceId, k: u32) -> [DVec3; 2] {
         let (first, n) = self.topology().face_corners(face.0);
         let corner = |k: u32| self.object_point(self.topology().vertex(first + k % n));
         let center = (0..n).map(corner).sum::<DVec3>() / f64::from(n);
         let middle = 0.5 * (corner(k) + corner(k + 1));
-        let whole = rate(middle, middle + 2.0 * (center - middle)).clamp(1, MAX_RATE);
-        round_up(whole.div_ceil(2), self.edited().inner_unit(face))
+        [middle, middle + 2.0 * (center - middle)]
     }
 
     /// A control point in object space.
@@ -111,10 +122,14 @@ impl Surface {
     }
 }
 
-/// Turns parts of patches into lattice vertices. Holds scratch memory and the last patch: keep one per thread.
+/// Patches whose ring points a dicer remembers, one for each remainder of patch numbers: rays come back to the few patches
+/// around them.
+const N_REMEMBERED: usize = 16;
+
+/// Turns parts of patches into lattice vertices. Holds scratch memory and the last patches: keep one per thread.
 #[derive(Debug, Default)]
 pub struct Dicer {
-    points: PatchPoints,
+    points: [PatchPoints; N_REMEMBERED],
     evaluator: Evaluator,
     out: Vec<Point>,
     owner: OwnerScratch,
@@ -161,19 +176,23 @@ impl SidePoint {
     }
 }
 
+/// A border vertex of a grid that is being diced: vertex (i, j) of it, which is vertex `along + at` of `n` of a side.
+struct BorderVertex {
+    side: usize,
+    n: u32,
+    along: u32,
+    i: usize,
+    j: usize,
+    at: usize,
+}
+
 /// The edge point that border vertex `i` of `n` snaps to where the side has only `rate` segments.
 pub fn snapped(i: u32, n: u32, rate: u32) -> u32 {
     ((2 * u64::from(i) * u64::from(rate) + u64::from(n)) / (2 * u64::from(n))) as u32
 }
 
 impl Dicer {
-    /// Forgets the last patch: call it before turning to another surface.
-    pub fn forget(&mut self) {
-        self.points.forget();
-        self.owner.points.forget();
-    }
-
-    /// The lattice vertices `i0..=i1` by `j0..=j1` of a patch's grid, i fastest, appended to a cleared `out`.
+    /// The lattice vertices `i0..=i1` by `j0..=j1` of a patch's grid.
     pub fn dice(
         &mut self,
         surface: &Surface,
@@ -181,80 +200,111 @@ impl Dicer {
         rates: &PatchRates,
         [i0, i1]: [u32; 2],
         [j0, j1]: [u32; 2],
-        out: &mut Vec<[i32; 3]>,
+        out: &mut LatticeGrid,
     ) {
-        surface.load(patch, &mut self.points);
+        let lane = self.load(surface, patch);
         let (n_i, n_j) = ((i1 - i0 + 1) as usize, (j1 - j0 + 1) as usize);
         self.out.clear();
         self.out.resize(n_i * n_j, Point::ZERO);
         let (n_u, n_v) = (f64::from(rates.n_u), f64::from(rates.n_v));
         let us = (i0..=i1).map(|i| f64::from(i) / n_u);
         let vs = (j0..=j1).map(|j| f64::from(j) / n_v);
-        surface.grid(&self.points, &mut self.evaluator, us, vs, &mut self.out);
-        out.clear();
-        out.extend(self.out.iter().map(|&p| round_point(p).0));
-        for (side, at, end) in [(0, j0, 0), (2, j1, rates.n_v)] {
+        surface.grid(&self.points[lane], &mut self.evaluator, us, vs, &mut self.out);
+        out.round(&self.out, n_i, Rounding { shift: LATTICE_SHIFT, guard: GUARD });
+        for (side, at, end, j) in [(0, j0, 0, 0), (2, j1, rates.n_v, n_j - 1)] {
             if at == end {
-                let row = if side == 0 { 0 } else { n_j - 1 } * n_i;
-                for i in i0..=i1 {
-                    let k = row + (i - i0) as usize;
-                    out[k] = self.border_vertex(surface, patch, rates, side, i, rates.n_u, self.out[k]);
+                for i in 0..n_i {
+                    self.settle(
+                        surface,
+                        patch,
+                        rates,
+                        BorderVertex { side, n: rates.n_u, along: i0, i, j, at: i },
+                        out,
+                    );
                 }
             }
         }
-        for (side, at, end) in [(3, i0, 0), (1, i1, rates.n_u)] {
+        for (side, at, end, i) in [(3, i0, 0, 0), (1, i1, rates.n_u, n_i - 1)] {
             if at == end {
-                let column = if side == 3 { 0 } else { n_i - 1 };
-                for j in j0..=j1 {
-                    let k = (j - j0) as usize * n_i + column;
-                    out[k] = self.border_vertex(surface, patch, rates, side, j, rates.n_v, self.out[k]);
+                for j in 0..n_j {
+                    self.settle(
+                        surface,
+                        patch,
+                        rates,
+                        BorderVertex { side, n: rates.n_v, along: j0, i, j, at: j },
+                        out,
+                    );
                 }
             }
         }
     }
 
-    /// Border vertex `i` of `n` on a side, given its evaluated position.
-    #[allow(clippy::too_many_arguments)]
-    fn border_vertex(
+    /// Makes a border vertex what both sides agree on: a point of the edge, and its owner's rounding where theirs could
+    /// differ.
+    #[inline]
+    fn settle(
         &mut self,
         surface: &Surface,
         patch: PatchId,
         rates: &PatchRates,
-        side: usize,
-        i: u32,
-        n: u32,
-        evaluated: Point,
-    ) -> [i32; 3] {
-        let rate = rates.sides[side];
-        let at = SidePoint { side, index: if rate == n { i } else { snapped(i, n, rate) }, rate };
-        let p = if rate == n {
-            evaluated
-        } else {
-            let (u, v) = at.uv();
-            self.point(surface, u, v)
-        };
-        match round_point(p) {
+        b: BorderVertex,
+        out: &mut LatticeGrid,
+    ) {
+        let rate = rates.sides[b.side];
+        let index = b.along + b.at as u32;
+        if rate == b.n {
+            if out.is_near(b.i, b.j) {
+                let at = SidePoint { side: b.side, index, rate };
+                out.set(b.i, b.j, self.owner.side_point(surface, patch, rates, at));
+            }
+            return;
+        }
+        out.set(
+            b.i,
+            b.j,
+            self.snapped_vertex(
+                surface,
+                patch,
+                rates,
+                SidePoint { side: b.side, index: snapped(index, b.n, rate), rate },
+            ),
+        );
+    }
+
+    /// The vertex at a point of a side that has fewer segments than the grid.
+    fn snapped_vertex(&mut self, surface: &Surface, patch: PatchId, rates: &PatchRates, at: SidePoint) -> [i32; 3] {
+        let (u, v) = at.uv();
+        match round_point(self.point(surface, patch, u, v)) {
             (vertex, false) => vertex,
             _ => self.owner.side_point(surface, patch, rates, at),
         }
     }
 
-    fn point(&mut self, surface: &Surface, u: f64, v: f64) -> Point {
+    /// Fetches a patch's points; returns where they are.
+    #[inline]
+    fn load(&mut self, surface: &Surface, patch: PatchId) -> usize {
+        let lane = patch.idx() % N_REMEMBERED;
+        surface.load(patch, &mut self.points[lane]);
+        lane
+    }
+
+    fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> Point {
+        let lane = self.load(surface, patch);
         let mut p = [Point::ZERO];
-        surface.grid(&self.points, &mut self.evaluator, [u], [v], &mut p);
+        surface.grid(&self.points[lane], &mut self.evaluator, [u], [v], &mut p);
         p[0]
     }
 
     /// Position and tangents at a point of a patch, in lattice units without [`LATTICE_SHIFT`].
     pub fn sample(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> SurfaceSample {
-        surface.load(patch, &mut self.points);
-        surface.sample(&self.points, &mut self.evaluator, u, v)
+        let lane = self.load(surface, patch);
+        surface.sample(&self.points[lane], &mut self.evaluator, u, v)
     }
 
     /// The limit normal in object space, not normalised; zero where there is none.
     pub fn normal(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> DVec3 {
-        surface.load(patch, &mut self.points);
-        surface.normal(&self.points, &mut self.evaluator, u, v)
+        let lane = self.load(surface, patch);
+        surface.normal(&self.points[lane], &mut self.evaluator, u, v)
     }
 
     /// A box that holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing; `depth` more
@@ -268,10 +318,11 @@ impl Dicer {
         j: [u32; 2],
         depth: u32,
     ) -> Bounds {
-        surface.load(patch, &mut self.points);
+        let lane = self.load(surface, patch);
+        let points = &self.points[lane];
         let range = |[a, b]: [u32; 2], n: u32| [f64::from(a) / f64::from(n), f64::from(b) / f64::from(n)];
         let (u, v) = (range(i, rates.n_u), range(j, rates.n_v));
-        let mut bounds = surface.bounds(&self.points, &mut self.evaluator, u, v, depth);
+        let mut bounds = surface.bounds(points, &mut self.evaluator, u, v, depth);
         let snap = |[a, b]: [u32; 2], n: u32, r: u32| range([snapped(a, n, r), snapped(b, n, r)], r);
         for side in 0..4 {
             let (touches, n, along) = match side {
@@ -289,7 +340,7 @@ impl Dicer {
                     2 => (t, [1.0; 2]),
                     _ => ([0.0; 2], t),
                 };
-                bounds = bounds.union(surface.bounds(&self.points, &mut self.evaluator, u, v, depth));
+                bounds = bounds.union(surface.bounds(points, &mut self.evaluator, u, v, depth));
             }
         }
         to_lattice_box(bounds.min, bounds.max)
@@ -297,8 +348,8 @@ impl Dicer {
 
     /// As [`bounds`](Self::bounds) for a whole patch at any rates.
     pub fn patch_bounds(&mut self, surface: &Surface, patch: PatchId, depth: u32) -> Bounds {
-        surface.load(patch, &mut self.points);
-        let b = surface.bounds(&self.points, &mut self.evaluator, [0.0, 1.0], [0.0, 1.0], depth);
+        let lane = self.load(surface, patch);
+        let b = surface.bounds(&self.points[lane], &mut self.evaluator, [0.0, 1.0], [0.0, 1.0], depth);
         to_lattice_box(b.min, b.max)
     }
 }

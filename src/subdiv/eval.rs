@@ -1,8 +1,11 @@
-//! Walking down plans: grids of points, single samples with tangents, and conservative boxes.
+//! Walking down plans: grids of points, and single samples with tangents.
 
-use super::plan::{Child, Limit, NodeId, Plan, PlanLibrary, SparseRows};
+use super::bounds::HullWeights;
+use super::plan::{Child, Limit, NodeId, Plan, PlanLibrary};
+use super::products::{child_points, control_points, one_product, products};
 use super::regular::{self, ControlPoints};
-use crate::math::DBounds;
+use super::rows::SparseRows;
+use crate::math::simd;
 use glam::DVec3;
 use std::ops::{Add, Mul, Sub};
 
@@ -33,11 +36,19 @@ impl Point {
     }
 }
 
+impl AsRef<[f64; 4]> for Point {
+    #[inline(always)]
+    fn as_ref(&self) -> &[f64; 4] {
+        &self.0
+    }
+}
+
 impl Add for Point {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
-        Point(std::array::from_fn(|k| self.0[k] + o.0[k]))
+        let (a, b) = (self.0, o.0);
+        Point([a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]])
     }
 }
 
@@ -45,7 +56,8 @@ impl Sub for Point {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
-        Point(std::array::from_fn(|k| self.0[k] - o.0[k]))
+        let (a, b) = (self.0, o.0);
+        Point([a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]])
     }
 }
 
@@ -53,7 +65,8 @@ impl Mul<f64> for Point {
     type Output = Self;
     #[inline(always)]
     fn mul(self, s: f64) -> Self {
-        Point(std::array::from_fn(|k| self.0[k] * s))
+        let a = self.0;
+        Point([a[0] * s, a[1] * s, a[2] * s, a[3] * s])
     }
 }
 
@@ -88,11 +101,12 @@ const MAX_DEPTH: u32 = 52;
 #[derive(Debug, Default)]
 pub struct Evaluator {
     /// Ring points of all levels of the current walk, a stack.
-    points: Vec<Point>,
+    pub(super) points: Vec<Point>,
     /// Basis function values of a regular part, for u then v.
     basis: Vec<[f64; 4]>,
     /// Parameters of all levels, a stack.
     params: Vec<f64>,
+    pub(super) hulls: HullWeights,
 }
 
 /// A rectangle of a tensor grid of parameters, and where its points go.
@@ -104,20 +118,6 @@ pub(super) struct Target {
     /// Index of the first point and distance between rows in the output.
     first: usize,
     stride: usize,
-}
-
-#[inline(always)]
-fn product(rows: &SparseRows, i: usize, points: &[Point]) -> Point {
-    let (columns, weights) = rows.row(i);
-    let mut sum = Point::ZERO;
-    for (&c, &w) in columns.iter().zip(weights) {
-        sum = sum + points[c as usize] * w;
-    }
-    sum
-}
-
-fn control_points(rows: &SparseRows, points: &[Point]) -> ControlPoints {
-    std::array::from_fn(|k| product(rows, k, points))
 }
 
 /// Where a polygon's child or a quad's quarter lies: its corner in units of its size.
@@ -195,7 +195,7 @@ impl Evaluator {
     ) {
         let (rows, children, limits) = match library.plan(node) {
             Plan::Regular(rows) => {
-                let control = control_points(rows, &self.points[ring..]);
+                let control = control_points(library.rows(), *rows, &self.points[ring..]);
                 return self.regular(&control, target, out);
             }
             Plan::Split { rows, children, limits, .. } => (rows, children, limits),
@@ -205,36 +205,41 @@ impl Evaluator {
             let (u, v) = (self.params[target.us.0], self.params[target.vs.0]);
             let corner = if depth >= MAX_DEPTH { exact_corner(u.round(), v.round()) } else { exact_corner(u, v) };
             if let Some(Limit::Position(rows) | Limit::Smooth(rows)) = corner.and_then(|k| limits.get(k)) {
-                let p = product(rows, 0, &self.points[ring..]);
+                let p = one_product(library.rows(), *rows, 0, &self.points[ring..]);
                 self.fill(target, p, out);
                 return;
             }
         }
-        let refined = self.refine(rows, ring);
-        let marks = (self.points.len(), self.params.len());
         let middle = self.middle(&target);
-        for (k, child) in children.iter().enumerate() {
-            if let Some(part) = self.quarter_target(&target, middle, k) {
-                let child_ring = self.push_child(child, refined);
-                self.walk(library, child.node, child_ring, depth + 1, part, out);
-                self.points.truncate(marks.0);
-                self.params.truncate(marks.1);
-            }
+        let quarters = quarters_of(&target, middle);
+        let start = self.points.len();
+        let refined = if quarters.count_ones() > 1 { Some(self.refine(library, *rows, ring)) } else { None };
+        let marks = (self.points.len(), self.params.len());
+        for (k, child) in children.iter().enumerate().filter(|(k, _)| quarters >> k & 1 == 1) {
+            let part = self.quarter_target(&target, middle, k);
+            let child_ring = match refined {
+                Some(refined) => self.push_child(library, child, refined),
+                None => self.refine_child(library, *rows, child, ring),
+            };
+            self.walk(library, child.node, child_ring, depth + 1, part, out);
+            self.points.truncate(marks.0);
+            self.params.truncate(marks.1);
         }
-        self.points.truncate(refined);
-        self.set_corners(limits, ring, &target, out);
+        self.points.truncate(start);
+        self.set_corners(library, limits, ring, &target, out);
     }
 
     /// Corners whose limit is known here, in place of what deeper parts made of them: a point alone comes no further than
     /// this, and must not depend on its company.
-    fn set_corners(&self, limits: &[Limit], ring: usize, target: &Target, out: &mut [Point]) {
+    fn set_corners(&self, library: &PlanLibrary, limits: &[Limit], ring: usize, target: &Target, out: &mut [Point]) {
         let (n_u, n_v) = (target.us.1 - target.us.0, target.vs.1 - target.vs.0);
         for (k, limit) in limits.iter().enumerate() {
             let (x, y) = quarter(k);
             let (i, j) = (if x == 0.0 { 0 } else { n_u - 1 }, if y == 0.0 { 0 } else { n_v - 1 });
             let is_wanted = self.params[target.us.0 + i] == x && self.params[target.vs.0 + j] == y;
             if let (true, Limit::Position(rows) | Limit::Smooth(rows)) = (is_wanted, limit) {
-                out[target.first + j * target.stride + i] = product(rows, 0, &self.points[ring..]);
+                let p = one_product(library.rows(), *rows, 0, &self.points[ring..]);
+                out[target.first + j * target.stride + i] = p;
             }
         }
     }
@@ -246,19 +251,16 @@ impl Evaluator {
         (split(target.us), split(target.vs))
     }
 
-    /// The part of a target in quarter `k`, its parameters pushed as the quarter sees them; none if it has no points.
+    /// The part of a target in quarter `k`, one of [`quarters_of`] it, its parameters pushed as the quarter sees them.
     #[inline(always)]
-    pub(super) fn quarter_target(&mut self, target: &Target, middle: (usize, usize), k: usize) -> Option<Target> {
+    pub(super) fn quarter_target(&mut self, target: &Target, middle: (usize, usize), k: usize) -> Target {
         let (x, y) = quarter(k);
         let us = if x == 0.0 { (target.us.0, middle.0) } else { (middle.0, target.us.1) };
         let vs = if y == 0.0 { (target.vs.0, middle.1) } else { (middle.1, target.vs.1) };
-        if us.0 == us.1 || vs.0 == vs.1 {
-            return None;
-        }
         let first = target.first + (us.0 - target.us.0) + (vs.0 - target.vs.0) * target.stride;
         let us = self.push_params(us, x);
         let vs = self.push_params(vs, y);
-        Some(Target { us, vs, first, stride: target.stride })
+        Target { us, vs, first, stride: target.stride }
     }
 
     pub(super) fn n_params(&self) -> usize {
@@ -277,21 +279,35 @@ impl Evaluator {
     }
 
     /// Pushes the refined points; returns where they start.
-    fn refine(&mut self, rows: &SparseRows, ring: usize) -> usize {
+    pub(super) fn refine(&mut self, library: &PlanLibrary, rows: SparseRows, ring: usize) -> usize {
         let start = self.points.len();
-        for i in 0..rows.len() {
-            let p = product(rows, i, &self.points[ring..start]);
-            self.points.push(p);
-        }
+        self.points.resize(start + rows.len(), Point::ZERO);
+        let (points, out) = self.points.split_at_mut(start);
+        products(library.rows(), rows, &points[ring..], out);
         start
     }
 
-    fn push_child(&mut self, child: &Child, refined: usize) -> usize {
+    /// Pushes the ring of a child out of all refined points; returns where it starts.
+    pub(super) fn push_child(&mut self, library: &PlanLibrary, child: &Child, refined: usize) -> usize {
         let start = self.points.len();
-        for &p in &child.points {
-            let p = self.points[refined + p as usize];
-            self.points.push(p);
-        }
+        self.points.resize(start + child.points.len(), Point::ZERO);
+        let (points, out) = self.points.split_at_mut(start);
+        library.rows().gather(child.points, &points[refined..], out);
+        start
+    }
+
+    /// Pushes the ring of the only child that is wanted; returns where it starts.
+    pub(super) fn refine_child(
+        &mut self,
+        library: &PlanLibrary,
+        rows: SparseRows,
+        child: &Child,
+        ring: usize,
+    ) -> usize {
+        let start = self.points.len();
+        self.points.resize(start + child.points.len(), Point::ZERO);
+        let (points, out) = self.points.split_at_mut(start);
+        child_points(library.rows(), rows, child, &points[ring..], out);
         start
     }
 
@@ -307,15 +323,10 @@ impl Evaluator {
 
     fn regular(&mut self, control: &ControlPoints, target: Target, out: &mut [Point]) {
         self.basis.clear();
-        self.basis.extend(self.params[target.us.0..target.us.1].iter().map(|&u| regular::basis(u)));
-        let n_u = self.basis.len();
-        for (j, v) in (target.vs.0..target.vs.1).enumerate() {
-            let columns = regular::columns(control, &regular::basis(self.params[v]));
-            let row = &mut out[target.first + j * target.stride..][..n_u];
-            for (p, b) in row.iter_mut().zip(&self.basis) {
-                *p = regular::combine(b, columns);
-            }
-        }
+        let (us, vs) = (&self.params[target.us.0..target.us.1], &self.params[target.vs.0..target.vs.1]);
+        self.basis.extend(us.iter().chain(vs).map(|&t| regular::basis(t)));
+        let (u, v) = self.basis.split_at(us.len());
+        simd::run(regular::Positions { control, u, v, out, first: target.first, stride: target.stride });
     }
 
     /// Position and tangents at one point.
@@ -337,19 +348,19 @@ impl Evaluator {
         for depth in depth.. {
             match library.plan(node) {
                 Plan::Regular(rows) => {
-                    return regular_sample(&control_points(rows, &self.points[ring..]), u, v, scale);
+                    let control = control_points(library.rows(), *rows, &self.points[ring..]);
+                    return regular_sample(&control, u, v, scale);
                 }
                 Plan::Split { rows, children, limits, .. } => {
                     let corner =
                         if depth < MAX_DEPTH { exact_corner(u, v) } else { exact_corner(u.round(), v.round()) };
                     let limit = corner.and_then(|k| limits.get(k));
-                    if let Some(sample) = limit.and_then(|limit| limit_sample(limit, &self.points[ring..])) {
+                    if let Some(sample) = limit.and_then(|limit| limit_sample(library, limit, &self.points[ring..])) {
                         return sample;
                     }
                     let (x, y) = (f64::from(u8::from(u >= 0.5)), f64::from(u8::from(v >= 0.5)));
                     let k = exact_corner(x, y).expect("halves are corners");
-                    let refined = self.refine(rows, ring);
-                    ring = self.push_child(&children[k], refined);
+                    ring = self.refine_child(library, *rows, &children[k], ring);
                     node = children[k].node;
                     (u, v) = (2.0 * u - x, 2.0 * v - y);
                     scale *= 2.0;
@@ -359,95 +370,40 @@ impl Evaluator {
         unreachable!("every walk ends in a regular part or a corner")
     }
 
-    /// A box that holds the part `[u0,u1] x [v0,v1]` of the patch: the Bézier hulls of its regular parts, and ring hulls
-    /// `depth` splits below the patch, or where the surface is known to lie in them.
-    pub fn bounds(
-        &mut self,
-        library: &PlanLibrary,
-        node: NodeId,
-        ring: &[Point],
-        u: [f64; 2],
-        v: [f64; 2],
-        depth: u32,
-    ) -> DBounds {
-        let ring = self.start_ring(ring);
-        let mut bounds = DBounds::EMPTY;
-        self.bound(library, node, ring, u, v, depth, &mut bounds);
-        bounds
-    }
-
-    #[allow(clippy::too_many_arguments)]
-    fn bound(
-        &mut self,
-        library: &PlanLibrary,
-        node: NodeId,
-        ring: usize,
-        u: [f64; 2],
-        v: [f64; 2],
-        depth: u32,
-        bounds: &mut DBounds,
-    ) {
-        match library.plan(node) {
-            Plan::Regular(rows) => {
-                let control = control_points(rows, &self.points[ring..]);
-                grow_by_hull(bounds, &control, u, v);
-            }
-            Plan::Split { in_hull: true, .. } if depth == 0 => {
-                let n = library.n_points(node);
-                self.points[ring..ring + n].iter().for_each(|p| bounds.grow(p.to_vec()));
-            }
-            Plan::Split { rows, children, .. } => {
-                let refined = self.refine(rows, ring);
-                let mark = self.points.len();
-                for (k, child) in children.iter().enumerate() {
-                    let (x, y) = quarter(k);
-                    let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) else { continue };
-                    let child_ring = self.push_child(child, refined);
-                    self.bound(library, child.node, child_ring, u, v, depth.saturating_sub(1), bounds);
-                    self.points.truncate(mark);
-                }
-                self.points.truncate(refined);
-            }
-        }
-    }
-
     /// Appends to a polygon's ring points those of its refinement, which all its children share.
     pub fn refine_polygon(library: &PlanLibrary, node: NodeId, points: &mut Vec<Point>) {
         let (rows, _) = polygon(library, node);
         for i in 0..rows.len() {
             // After row 0 the slice ends with the face point, where other rows look for it.
-            let refined = product(rows, i, points);
+            let refined = one_product(library.rows(), rows, i, points);
             points.push(refined);
         }
     }
 
-    /// The ring points of a child of a polygon, appended to `out`; `points` are those of [`Self::refine_polygon`].
+    /// The ring points of a child of a polygon, in place of what was in `out`; `points` are those of [`Self::refine_polygon`].
     pub fn child_ring(library: &PlanLibrary, node: NodeId, points: &[Point], k: usize, out: &mut Vec<Point>) -> NodeId {
         let child = &polygon(library, node).1[k];
         let refined = &points[library.n_points(node)..];
-        out.extend(child.points.iter().map(|&p| refined[p as usize]));
+        out.clear();
+        out.resize(child.points.len(), Point::ZERO);
+        library.rows().gather(child.points, refined, out);
         child.node
     }
 }
 
-fn polygon(library: &PlanLibrary, node: NodeId) -> (&SparseRows, &[Child]) {
+fn polygon(library: &PlanLibrary, node: NodeId) -> (SparseRows, &[Child]) {
     match library.plan(node) {
-        Plan::Split { rows, children, .. } => (rows, children),
+        Plan::Split { rows, children, .. } => (*rows, children),
         Plan::Regular(_) => unreachable!("a polygon is never regular"),
     }
 }
 
-/// Enlarges `bounds` by the Bézier hull of a part of a regular patch.
-pub fn grow_by_hull(bounds: &mut DBounds, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) {
-    for p in regular::bezier_points(control, u, v) {
-        bounds.grow(p.to_vec());
-    }
-}
-
-/// The part of a parameter range that lies in the lower (0) or upper (1) half, as the half sees it.
-pub(super) fn half_range([a, b]: [f64; 2], offset: f64) -> Option<[f64; 2]> {
-    let range = [(2.0 * a - offset).max(0.0), (2.0 * b - offset).min(1.0)];
-    (range[0] <= range[1]).then_some(range)
+/// The quarters in which a target has points, as bits. `middle` is [`Evaluator::middle`].
+pub(super) fn quarters_of(target: &Target, middle: (usize, usize)) -> u32 {
+    let (lower_u, upper_u) = (target.us.0 < middle.0, middle.0 < target.us.1);
+    let (lower_v, upper_v) = (target.vs.0 < middle.1, middle.1 < target.vs.1);
+    let bits = [lower_u && lower_v, upper_u && lower_v, upper_u && upper_v, lower_u && upper_v];
+    (0..4).fold(0, |m, k| m | (u32::from(bits[k]) << k))
 }
 
 fn regular_sample(control: &ControlPoints, u: f64, v: f64, scale: f64) -> SurfaceSample {
@@ -467,9 +423,9 @@ pub fn sample_regular(control: &ControlPoints, u: f64, v: f64) -> SurfaceSample 
     regular_sample(control, u, v, 1.0)
 }
 
-fn limit_sample(limit: &Limit, points: &[Point]) -> Option<SurfaceSample> {
-    let at = |rows: &SparseRows, i| product(rows, i, points).to_vec();
-    match limit {
+fn limit_sample(library: &PlanLibrary, limit: &Limit, points: &[Point]) -> Option<SurfaceSample> {
+    let at = |rows: SparseRows, i| one_product(library.rows(), rows, i, points).to_vec();
+    match *limit {
         Limit::Regular => None,
         Limit::Position(rows) => Some(SurfaceSample {
             position: at(rows, 0),

@@ -24,13 +24,16 @@
 //! Sources: Catmull & Clark 1978; Stam 1998; Nießner et al. 2012; Brainerd et al. 2016 (plans); OpenSubdiv's rules.
 //! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`dice`], [`edits`]. [`refine`] is the slow reference.
 
+mod bounds;
 pub mod dice;
 pub mod edits;
 pub mod eval;
 pub mod local;
 pub mod plan;
+mod products;
 pub mod refine;
 pub mod regular;
+pub mod rows;
 pub mod rules;
 pub mod surface;
 

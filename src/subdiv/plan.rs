@@ -1,6 +1,7 @@
 //! The plan library: one node per distinct ring, shared by all faces, levels and meshes with the same rules.
 
 use super::local::{Extracted, LocalMesh, extract};
+use super::rows::{RowStore, Span, SparseRows};
 use super::rules::{self, CornerLimit, Origin, Refined, Row, RuleSet};
 use crate::mesh::CreaseMethod;
 use crate::topology::NONE;
@@ -10,59 +11,17 @@ use rustc_hash::FxHashMap;
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct NodeId(pub u32);
 
-/// Rows of a sparse matrix, one after the other.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SparseRows {
-    start: Vec<u32>,
-    column: Vec<u32>,
-    weight: Vec<f64>,
-}
-
-impl SparseRows {
-    /// Packs rows.
-    pub fn new<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Self {
-        let mut packed = SparseRows { start: vec![0], ..Default::default() };
-        for row in rows {
-            packed.column.extend(row.iter().map(|e| e.0));
-            packed.weight.extend(row.iter().map(|e| e.1));
-            packed.start.push(packed.column.len() as u32);
-        }
-        packed
-    }
-
-    /// Number of rows.
-    pub fn len(&self) -> usize {
-        self.start.len().saturating_sub(1)
-    }
-
-    /// Whether there is no row.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Columns and weights of row `i`.
-    #[inline]
-    pub fn row(&self, i: usize) -> (&[u32], &[f64]) {
-        let range = self.start[i] as usize..self.start[i + 1] as usize;
-        (&self.column[range.clone()], &self.weight[range])
-    }
-
-    fn bytes(&self) -> usize {
-        4 * (self.start.len() + self.column.len()) + 8 * self.weight.len()
-    }
-}
-
 /// A quarter of a split face.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Child {
     /// Its node.
     pub node: NodeId,
     /// Which refined point each of the child's ring points is.
-    pub points: Vec<u32>,
+    pub points: Span,
 }
 
 /// What is known of the limit at a corner of a node.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum Limit {
     /// The surface is regular there sooner or later: walk down.
     Regular,
@@ -83,9 +42,9 @@ pub enum Plan {
         /// one more ring point.
         rows: SparseRows,
         /// One child per corner. Quarters of quads keep the quad's orientation; children of polygons start at their corner.
-        children: Vec<Child>,
+        children: Box<[Child]>,
         /// Limits at the corners; none for polygons, of which only the children are evaluated.
-        limits: Vec<Limit>,
+        limits: Box<[Limit]>,
         /// Whether the surface lies in the convex hull of the ring (all weights from here on are non-negative).
         in_hull: bool,
     },
@@ -95,6 +54,7 @@ pub enum Plan {
 #[derive(Debug)]
 pub struct PlanLibrary {
     rules: RuleSet,
+    rows: RowStore,
     nodes: Vec<Option<Plan>>,
     n_points: Vec<u32>,
     by_key: FxHashMap<Vec<u32>, NodeId>,
@@ -103,7 +63,7 @@ pub struct PlanLibrary {
 impl PlanLibrary {
     /// An empty library.
     pub fn new(rules: RuleSet) -> Self {
-        Self { rules, nodes: Vec::new(), n_points: Vec::new(), by_key: FxHashMap::default() }
+        Self { rules, rows: RowStore::default(), nodes: Vec::new(), n_points: Vec::new(), by_key: FxHashMap::default() }
     }
 
     /// Number of nodes.
@@ -127,6 +87,12 @@ impl PlanLibrary {
         self.nodes[node.0 as usize].as_ref().expect("nodes are complete once the library is built")
     }
 
+    /// The rows of all nodes.
+    #[inline(always)]
+    pub fn rows(&self) -> &RowStore {
+        &self.rows
+    }
+
     /// The options that all its meshes share.
     pub fn rules(&self) -> RuleSet {
         self.rules
@@ -140,12 +106,13 @@ impl PlanLibrary {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let keys: usize = self.by_key.keys().map(|k| 4 * k.len() + 40).sum();
-        keys + self.nodes.iter().flatten().map(plan_bytes).sum::<usize>()
+        keys + self.rows.bytes() + self.nodes.iter().flatten().map(plan_bytes).sum::<usize>()
     }
 
     /// Forgets how nodes were found, once no more are needed.
     pub fn seal(&mut self) {
         self.by_key = FxHashMap::default();
+        self.rows.seal();
     }
 
     /// The node for a ring, if it is known.
@@ -165,7 +132,7 @@ impl PlanLibrary {
         self.by_key.insert(key, id);
         let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
         let plan = match regular {
-            Some(rows) => Plan::Regular(SparseRows::new(rows.iter().flatten())),
+            Some(rows) => Plan::Regular(self.rows.push(rows.iter().flatten())),
             None => self.split(id, ring),
         };
         self.nodes[id.0 as usize] = Some(plan);
@@ -178,14 +145,14 @@ impl PlanLibrary {
         let rings: Vec<Extracted> =
             (0..n).map(|k| extract(&refined.mesh, child_start(n, k), self.outer_tags())).collect();
         let (rows, points) = self.shared_rows(ring, &refined, &rings);
-        let children: Vec<Child> =
-            rings.iter().zip(points).map(|(child, points)| Child { node: self.node(&child.mesh), points }).collect();
-        let packed = SparseRows::new(&rows);
-        let limits = if n == 4 {
-            (0..n).map(|k| self.limit(id, ring, &packed, &children[k as usize], k)).collect()
-        } else {
-            Vec::new()
-        };
+        let packed = self.rows.push(&rows);
+        let children: Box<[Child]> = rings
+            .iter()
+            .zip(points)
+            .map(|(child, points)| Child { node: self.node(&child.mesh), points: self.rows.push_indices(&points) })
+            .collect();
+        let n_limits = if n == 4 { 4 } else { 0 };
+        let limits = (0..n_limits).map(|k| self.limit(id, ring, packed, &children[k as usize], k)).collect();
         let semi_sharp = ring.tags.iter().any(|t| !t.semi_sharp.is_empty());
         let in_hull = !(self.outer_tags() && semi_sharp);
         Plan::Split { rows: packed, children, limits, in_hull }
@@ -211,10 +178,10 @@ impl PlanLibrary {
         (rows, points)
     }
 
-    fn limit(&self, id: NodeId, ring: &LocalMesh, rows: &SparseRows, child: &Child, k: u32) -> Limit {
+    fn limit(&mut self, id: NodeId, ring: &LocalMesh, rows: SparseRows, child: &Child, k: u32) -> Limit {
         match rules::corner_limit(ring, k) {
             CornerLimit::Regular => Limit::Regular,
-            CornerLimit::Position(row) => Limit::Position(SparseRows::new([&row])),
+            CornerLimit::Position(row) => Limit::Position(self.rows.push([&row])),
             CornerLimit::Smooth(position, [along, next]) => {
                 let negated = |row: &Row| -> Row { row.iter().map(|&(p, w)| (p, -w)).collect() };
                 let [du, dv] = match k {
@@ -223,36 +190,60 @@ impl PlanLibrary {
                     2 => [negated(&along), negated(&next)],
                     _ => [next, negated(&along)],
                 };
-                Limit::Smooth(SparseRows::new([&position, &du, &dv]))
+                Limit::Smooth(self.rows.push([&position, &du, &dv]))
             }
-            CornerLimit::Iterate if child.node == id => Limit::Position(iterate(ring, rows, child, k)),
+            CornerLimit::Iterate if child.node == id => Limit::Position(self.iterate(ring, rows, child, k)),
             CornerLimit::Iterate | CornerLimit::Descend => self.pull_back(rows, child, k),
         }
     }
 
     /// A child's limit at its corner, in terms of this ring's points.
-    fn pull_back(&self, rows: &SparseRows, child: &Child, corner: u32) -> Limit {
-        let compose = |limit: &SparseRows| {
-            let composed: Vec<Row> = (0..limit.len())
-                .map(|i| {
-                    let (columns, weights) = limit.row(i);
-                    let terms = columns.iter().zip(weights).flat_map(|(&c, &w)| {
-                        let (from, by) = rows.row(child.points[c as usize] as usize);
-                        from.iter().zip(by).map(move |(&p, &x)| (p, x * w))
-                    });
-                    rules::merge(terms.collect())
-                })
-                .collect();
-            SparseRows::new(&composed)
-        };
-        match self.plan(child.node) {
+    fn pull_back(&mut self, rows: SparseRows, child: &Child, corner: u32) -> Limit {
+        let limit = match self.plan(child.node) {
             Plan::Regular(_) => Limit::Regular,
-            Plan::Split { limits, .. } => match &limits[corner as usize] {
-                Limit::Regular => Limit::Regular,
-                Limit::Position(row) => Limit::Position(compose(row)),
-                Limit::Smooth(rows) => Limit::Smooth(compose(rows)),
-            },
+            Plan::Split { limits, .. } => limits[corner as usize],
+        };
+        match limit {
+            Limit::Regular => Limit::Regular,
+            Limit::Position(row) => Limit::Position(self.compose(rows, child, row)),
+            Limit::Smooth(three) => Limit::Smooth(self.compose(rows, child, three)),
         }
+    }
+
+    /// Rows over a child's points, as rows over this ring's.
+    fn compose(&mut self, rows: SparseRows, child: &Child, of_child: SparseRows) -> SparseRows {
+        let store = &self.rows;
+        let composed: Vec<Row> = (0..of_child.len())
+            .map(|i| {
+                let terms = store.row(of_child, i).into_iter().flat_map(|(c, w)| {
+                    let point = store.index(child.points, c as usize);
+                    store.row(rows, point).into_iter().map(move |(p, x)| (p, x * w))
+                });
+                rules::merge(terms.collect())
+            })
+            .collect();
+        self.rows.push(&composed)
+    }
+
+    /// The limit of corner `k` of a node whose quarter there is the node itself: the row of the corner after many steps.
+    ///
+    /// The part of the row that has not converged shrinks by the subdominant eigenvalue each step, at most 0.75 for the
+    /// rings that have no closed form, so that 200 steps leave less than 1e-24 of it.
+    fn iterate(&mut self, ring: &LocalMesh, rows: SparseRows, child: &Child, k: u32) -> SparseRows {
+        const STEPS: usize = 200;
+        let n = ring.n_vertices();
+        let mut limit = vec![0.0; n];
+        limit[ring.vertex[k as usize] as usize] = 1.0;
+        for _ in 0..STEPS {
+            let mut before = vec![0.0; n];
+            for (c, &w) in limit.iter().enumerate().filter(|(_, w)| **w != 0.0) {
+                let point = self.rows.index(child.points, c);
+                self.rows.row(rows, point).into_iter().for_each(|(p, x)| before[p as usize] += x * w);
+            }
+            limit = before;
+        }
+        let row: Row = limit.iter().enumerate().filter(|(_, w)| **w != 0.0).map(|(p, &w)| (p as u32, w)).collect();
+        self.rows.push([&row])
     }
 }
 
@@ -273,38 +264,11 @@ fn corner_origin(ring: &LocalMesh, origin: Origin) -> Origin {
     }
 }
 
-/// The limit of corner `k` of a node whose quarter there is the node itself: the row of the corner after many steps.
-///
-/// The part of the row that has not converged shrinks by the subdominant eigenvalue each step, at most 0.75 for the
-/// rings that have no closed form, so that 200 steps leave less than 1e-24 of it.
-fn iterate(ring: &LocalMesh, rows: &SparseRows, child: &Child, k: u32) -> SparseRows {
-    const STEPS: usize = 200;
-    let n = ring.n_vertices();
-    let mut limit = vec![0.0; n];
-    limit[ring.vertex[k as usize] as usize] = 1.0;
-    for _ in 0..STEPS {
-        let mut before = vec![0.0; n];
-        for (c, &w) in limit.iter().enumerate().filter(|(_, w)| **w != 0.0) {
-            let (from, by) = rows.row(child.points[c] as usize);
-            from.iter().zip(by).for_each(|(&p, &x)| before[p as usize] += x * w);
-        }
-        limit = before;
-    }
-    let row: Row = limit.iter().enumerate().filter(|(_, w)| **w != 0.0).map(|(p, &w)| (p as u32, w)).collect();
-    SparseRows::new([&row])
-}
-
 fn plan_bytes(plan: &Plan) -> usize {
-    let limit_bytes = |l: &Limit| match l {
-        Limit::Regular => 0,
-        Limit::Position(rows) | Limit::Smooth(rows) => rows.bytes(),
-    };
-    match plan {
-        Plan::Regular(rows) => rows.bytes(),
-        Plan::Split { rows, children, limits, .. } => {
-            rows.bytes()
-                + children.iter().map(|c| 4 * c.points.len() + 32).sum::<usize>()
-                + limits.iter().map(|l| limit_bytes(l) + 80).sum::<usize>()
+    size_of::<Option<Plan>>()
+        + size_of::<u32>()
+        + match plan {
+            Plan::Regular(_) => 0,
+            Plan::Split { children, limits, .. } => size_of_val::<[Child]>(children) + size_of_val::<[Limit]>(limits),
         }
-    }
 }

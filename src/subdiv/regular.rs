@@ -1,6 +1,7 @@
 //! Uniform bicubic B-spline patches: evaluation, derivatives, and the Bézier hull of a part.
 
 use super::eval::Point;
+use crate::math::simd::{Kernel, Task};
 
 /// 16 control points, u fastest; the patch lies between `[5]`, `[6]`, `[9]` and `[10]`.
 pub type ControlPoints = [Point; 16];
@@ -34,42 +35,104 @@ pub fn columns(c: &ControlPoints, b: &[f64; 4]) -> [Point; 4] {
     std::array::from_fn(|i| combine(b, [c[i], c[4 + i], c[8 + i], c[12 + i]]))
 }
 
-/// Weights that turn four B-spline points into the four Bézier points of the part [a, b] of their segment: its blossom
-/// at (a,a,a), (a,a,b), (a,b,b), (b,b,b) (Ramshaw 1989).
-fn bezier_weights(a: f64, b: f64) -> [[f64; 4]; 4] {
-    let blossom = |x: f64, y: f64, z: f64| -> [f64; 4] {
-        let q = [[(1.0 - x) / 3.0, (x + 2.0) / 3.0], [(2.0 - x) / 3.0, (x + 1.0) / 3.0], [(3.0 - x) / 3.0, x / 3.0]];
-        let r = [[(1.0 - y) / 2.0, (y + 1.0) / 2.0], [(2.0 - y) / 2.0, y / 2.0]];
-        let s = [1.0 - z, z];
-        let mut w = [0.0; 4];
-        for (k, sk) in s.iter().enumerate() {
-            for l in 0..2 {
-                for m in 0..2 {
-                    w[k + l + m] += sk * r[k][l] * q[k + l][m];
-                }
+/// Four points and their weights, summed in the order of [`combine`].
+#[inline(always)]
+fn combine_lanes<K: Kernel>(k: K, weights: &[f64; 4], c: [K::D; 4]) -> K::D {
+    let product = [
+        k.mul4(c[0], k.splat4(weights[0])),
+        k.mul4(c[1], k.splat4(weights[1])),
+        k.mul4(c[2], k.splat4(weights[2])),
+        k.mul4(c[3], k.splat4(weights[3])),
+    ];
+    k.add4(k.add4(k.add4(product[0], product[1]), product[2]), product[3])
+}
+
+/// [`columns`] in registers.
+#[inline(always)]
+fn column_lanes<K: Kernel>(k: K, c: &ControlPoints, b: &[f64; 4]) -> [K::D; 4] {
+    let [mut c0, mut c1, mut c2, mut c3] = [k.splat4(0.0); 4];
+    for (i, out) in [&mut c0, &mut c1, &mut c2, &mut c3].into_iter().enumerate() {
+        let column = [k.load4(&c[i].0), k.load4(&c[4 + i].0), k.load4(&c[8 + i].0), k.load4(&c[12 + i].0)];
+        *out = combine_lanes(k, b, column);
+    }
+    [c0, c1, c2, c3]
+}
+
+/// Positions at all pairs of basis values: `out[first + j * stride + i]` is at `(u[i], v[j])`.
+pub(super) struct Positions<'a> {
+    pub control: &'a ControlPoints,
+    pub u: &'a [[f64; 4]],
+    pub v: &'a [[f64; 4]],
+    pub out: &'a mut [Point],
+    pub first: usize,
+    pub stride: usize,
+}
+
+impl Task for Positions<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) {
+        for (j, v) in self.v.iter().enumerate() {
+            let columns = column_lanes(k, self.control, v);
+            let row = &mut self.out[self.first + j * self.stride..][..self.u.len()];
+            for (p, u) in row.iter_mut().zip(self.u) {
+                *p = Point(k.store4(combine_lanes(k, u, columns)));
             }
         }
-        w
-    };
+    }
+}
+
+/// Weights of four control points for each of four Bézier points.
+pub(super) type BezierWeights = [[f64; 4]; 4];
+
+/// Weights that turn four B-spline points into the four Bézier points of the part [a, b] of their segment: its blossom
+/// at (a,a,a), (a,a,b), (a,b,b), (b,b,b) (Ramshaw 1989).
+pub(super) fn bezier_weights([a, b]: [f64; 2]) -> BezierWeights {
     [blossom(a, a, a), blossom(a, a, b), blossom(a, b, b), blossom(b, b, b)]
 }
 
-/// The 16 Bézier points of the part `[u0, u1] x [v0, v1]`; their convex hull holds that part of the patch.
-pub fn bezier_points(c: &ControlPoints, [u0, u1]: [f64; 2], [v0, v1]: [f64; 2]) -> ControlPoints {
-    let (wu, wv) = (bezier_weights(u0, u1), bezier_weights(v0, v1));
-    let mut out = [Point::ZERO; 16];
-    for (j, w) in wv.iter().enumerate() {
-        let row = columns(c, w);
-        for (i, w) in wu.iter().enumerate() {
-            out[4 * j + i] = combine(w, row);
+#[inline(always)]
+fn blossom(x: f64, y: f64, z: f64) -> [f64; 4] {
+    let (third, half) = (1.0 / 3.0, 0.5);
+    let q = [
+        [(1.0 - x) * third, (x + 2.0) * third],
+        [(2.0 - x) * third, (x + 1.0) * third],
+        [(3.0 - x) * third, x * third],
+    ];
+    let r = [[(1.0 - y) * half, (y + 1.0) * half], [(2.0 - y) * half, y * half]];
+    // Two levels of de Boor's triangle, from the top: weights of two, three and four points.
+    let s = [1.0 - z, z];
+    let t = [s[0] * r[0][0], s[0] * r[0][1] + s[1] * r[1][0], s[1] * r[1][1]];
+    [t[0] * q[0][0], t[0] * q[0][1] + t[1] * q[1][0], t[1] * q[1][1] + t[2] * q[2][0], t[2] * q[2][1]]
+}
+
+/// The box around the 16 Bézier points of a part of a regular patch, which holds that part: [low, high].
+pub(super) struct Hull<'a> {
+    pub control: &'a ControlPoints,
+    pub u: &'a BezierWeights,
+    pub v: &'a BezierWeights,
+}
+
+impl Task for Hull<'_> {
+    type Output = [Point; 2];
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> [Point; 2] {
+        let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
+        for v in self.v {
+            let row = column_lanes(k, self.control, v);
+            for u in self.u {
+                let p = combine_lanes(k, u, row);
+                (low, high) = (k.min4(low, p), k.max4(high, p));
+            }
         }
+        [Point(k.store4(low)), Point(k.store4(high))]
     }
-    out
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::simd::run;
 
     fn control_points() -> ControlPoints {
         std::array::from_fn(|k| {
@@ -94,10 +157,44 @@ mod tests {
     #[test]
     fn bezier_corners_of_a_part_lie_on_the_patch() {
         let c = control_points();
-        let b = bezier_points(&c, [0.25, 0.7], [0.1, 0.6]);
-        for (k, u, v) in [(0, 0.25, 0.1), (3, 0.7, 0.1), (12, 0.25, 0.6), (15, 0.7, 0.6)] {
-            let difference = b[k] - at(&c, u, v);
-            assert!(difference.max_abs() < 1e-14, "corner {k}: {difference:?}");
+        let (wu, wv) = (bezier_weights([0.25, 0.7]), bezier_weights([0.1, 0.6]));
+        for (i, j, u, v) in [(0, 0, 0.25, 0.1), (3, 0, 0.7, 0.1), (0, 3, 0.25, 0.6), (3, 3, 0.7, 0.6)] {
+            let difference = combine(&wu[i], columns(&c, &wv[j])) - at(&c, u, v);
+            assert!(difference.max_abs() < 1e-14, "corner {i} {j}: {difference:?}");
+        }
+    }
+
+    #[test]
+    fn a_hull_holds_its_part_and_little_more() {
+        let c = control_points();
+        let (u, v) = ([0.25, 0.7], [0.1, 0.6]);
+        let [low, high] = run(Hull { control: &c, u: &bezier_weights(u), v: &bezier_weights(v) });
+        let mut tight = [Point([f64::INFINITY; 4]), Point([f64::NEG_INFINITY; 4])];
+        for k in 0..=400 {
+            let (s, t) = (f64::from(k % 21) / 20.0, f64::from(k / 21).min(20.0) / 20.0);
+            let p = at(&c, u[0] + s * (u[1] - u[0]), v[0] + t * (v[1] - v[0]));
+            for axis in 0..3 {
+                assert!(low.0[axis] <= p.0[axis] + 1e-12 && p.0[axis] <= high.0[axis] + 1e-12);
+                tight[0].0[axis] = tight[0].0[axis].min(p.0[axis]);
+                tight[1].0[axis] = tight[1].0[axis].max(p.0[axis]);
+            }
+        }
+        for axis in 0..3 {
+            let excess = [tight[0].0[axis] - low.0[axis], high.0[axis] - tight[1].0[axis]];
+            assert!(excess.iter().all(|e| *e < 0.2), "{axis}: {excess:?}");
+        }
+    }
+
+    #[test]
+    fn every_kernel_gives_the_positions_of_the_plain_sum() {
+        let c = control_points();
+        let t: Vec<[f64; 4]> = (0..9).map(|i| basis(f64::from(i) / 8.0)).collect();
+        let mut out = vec![Point::ZERO; 100];
+        run(Positions { control: &c, u: &t, v: &t[2..5], out: &mut out, first: 7, stride: 20 });
+        for (j, v) in t[2..5].iter().enumerate() {
+            for (i, u) in t.iter().enumerate() {
+                assert_eq!(out[7 + 20 * j + i], combine(u, columns(&c, v)));
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! One mesh ready for evaluation: topology, control points in lattice units, and the plan of every face.
 
 use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
-use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, grow_by_hull, sample_regular};
+use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, sample_regular};
 use super::local::{RingWalker, extract};
 use super::plan::{NodeId, PlanLibrary};
 use super::regular::ControlPoints;
@@ -13,7 +13,7 @@ use crate::mesh::ControlMesh;
 use crate::topology::{HalfEdges, NONE, Topology};
 use glam::DVec3;
 use parking_lot::RwLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// The integer grid that tessellated vertices are rounded to: `object = center + step * lattice`.
 ///
@@ -64,6 +64,8 @@ const EDITED: NodeId = NodeId(u32::MAX - 1);
 /// A mesh whose limit surface can be evaluated.
 #[derive(Debug)]
 pub struct Surface {
+    /// Tells surfaces apart, so that nobody takes remembered points of one for another's.
+    id: u64,
     topology: Topology,
     lattice: Lattice,
     control: Vec<[f32; 3]>,
@@ -77,12 +79,13 @@ pub struct Surface {
 /// The points that decide one patch.
 #[derive(Debug)]
 pub struct PatchPoints {
-    patch: Option<PatchId>,
+    /// The surface and the patch.
+    of: Option<(u64, PatchId)>,
     node: NodeId,
     control: ControlPoints,
     ring: Vec<Point>,
     /// The last polygon, and the points of its ring and refinement.
-    polygon_face: Option<FaceId>,
+    polygon_face: Option<(u64, FaceId)>,
     polygon: Vec<Point>,
     walker: RingWalker,
 }
@@ -90,7 +93,7 @@ pub struct PatchPoints {
 impl Default for PatchPoints {
     fn default() -> Self {
         Self {
-            patch: None,
+            of: None,
             node: REGULAR,
             control: [Point::ZERO; 16],
             ring: Vec::new(),
@@ -101,12 +104,7 @@ impl Default for PatchPoints {
     }
 }
 
-impl PatchPoints {
-    /// Forgets the patch.
-    pub fn forget(&mut self) {
-        (self.patch, self.polygon_face) = (None, None);
-    }
-}
+static SURFACES: AtomicU64 = AtomicU64::new(0);
 
 impl Surface {
     /// Prepares a mesh, on `n_threads` threads.
@@ -122,7 +120,8 @@ impl Surface {
         }
         let lattice = Lattice { center: DVec3::ZERO, step: 1.0 };
         let (control, edited) = (Vec::new(), EditedPatches::default());
-        let mut surface = Self { topology, lattice, control, library, plan_of_face, first_patch, edited };
+        let id = SURFACES.fetch_add(1, Ordering::Relaxed);
+        let mut surface = Self { id, topology, lattice, control, library, plan_of_face, first_patch, edited };
         surface.place(mesh, &sites)?;
         surface.library.seal();
         Ok(surface)
@@ -181,7 +180,7 @@ impl Surface {
         match &self.first_patch {
             None => (FaceId(patch.0), 0),
             Some(first) => {
-                let face = first.partition_point(|&p| p <= patch.0) - 1;
+                let face = face_from(first, patch.0);
                 (FaceId(face as u32), patch.0 - first[face])
             }
         }
@@ -240,10 +239,10 @@ impl Surface {
 
     /// Fetches what decides a patch, unless `points` holds it already.
     pub fn load(&self, patch: PatchId, points: &mut PatchPoints) {
-        if points.patch == Some(patch) {
+        if points.of == Some((self.id, patch)) {
             return;
         }
-        points.patch = Some(patch);
+        points.of = Some((self.id, patch));
         let (face, sub) = self.face_of(patch);
         let (first, size) = self.topology.face_corners(face.0);
         points.node = self.plan_of_face[face.idx()];
@@ -268,10 +267,10 @@ impl Surface {
 
     /// Refines a polygon, unless it is the last one: its patches, which it may have many of, are often loaded in a row.
     fn load_polygon(&self, face: FaceId, points: &mut PatchPoints) {
-        if points.polygon_face == Some(face) {
+        if points.polygon_face == Some((self.id, face)) {
             return;
         }
-        points.polygon_face = Some(face);
+        points.polygon_face = Some((self.id, face));
         let (first, _) = self.topology.face_corners(face.0);
         let sources = points.walker.sources(&self.topology, first, self.library.outer_tags());
         points.polygon.clear();
@@ -281,7 +280,7 @@ impl Surface {
 
     /// The quadtree of a patch under edits.
     fn tree(&self, points: &PatchPoints) -> Option<&EditTree> {
-        let patch = points.patch.filter(|_| points.node == EDITED)?;
+        let (_, patch) = points.of.filter(|_| points.node == EDITED)?;
         Some(self.edited.tree(patch))
     }
 
@@ -331,7 +330,7 @@ impl Surface {
     ) -> DBounds {
         if points.node == REGULAR {
             let mut bounds = DBounds::EMPTY;
-            grow_by_hull(&mut bounds, &points.control, u, v);
+            evaluator.grow_by_hull(&mut bounds, &points.control, u, v);
             bounds
         } else if let Some(tree) = self.tree(points) {
             evaluator.edited_bounds(&self.library, tree, u, v, depth)
@@ -352,6 +351,23 @@ fn lattice_point(control: &[[f32; 3]], vertex: u32) -> Point {
 
 fn patch_of(first_patch: Option<&[u32]>, face: FaceId, sub: u32) -> PatchId {
     PatchId(first_patch.map_or(face.0, |first| first[face.idx()]) + sub)
+}
+
+/// The face of a patch. Most meshes are quads with some other faces strewn in, so that a guess in proportion is close:
+/// from there by growing steps until the patch lies between two of them, then by halves.
+fn face_from(first: &[u32], patch: u32) -> usize {
+    let n_faces = first.len() - 1;
+    let guess = (u64::from(patch) * n_faces as u64 / u64::from(first[n_faces])) as usize;
+    let (mut low, mut high, mut step) = (guess, guess + 1, 1);
+    while first[low] > patch {
+        (low, high) = (low.saturating_sub(step), low);
+        step *= 2;
+    }
+    while first[high] <= patch {
+        (low, high) = (high, (high + step).min(n_faces));
+        step *= 2;
+    }
+    low + first[low..high].partition_point(|&p| p <= patch) - 1
 }
 
 fn first_patches(sizes: &[u32]) -> Vec<u32> {

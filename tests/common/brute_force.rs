@@ -69,10 +69,12 @@ impl<'w> BruteForce<'w> {
         let mesh = self.world.mesh(hit.primitive.mesh);
         let patch = self.meshes[hit.primitive.mesh.idx()].iter().find(|p| p.id == hit.primitive.patch);
         let patch = patch.expect("a patch that is hit has a surface");
-        if mesh.surface().edited().hide_cell(patch.id, &patch.rates, hit.primitive.cell) {
-            return Some(format!("cell {} of patch {} lies in a hole", hit.primitive.cell, patch.id));
+        let [i, j] = hit.primitive.cell.map(u32::from);
+        let cell = j * patch.rates.n_u + i;
+        if mesh.surface().edited().hide_cell(patch.id, &patch.rates, cell) {
+            return Some(format!("cell ({i}, {j}) of patch {} lies in a hole", patch.id));
         }
-        let triangle = patch.triangles[2 * hit.primitive.cell as usize + usize::from(hit.primitive.half)];
+        let triangle = patch.triangles[2 * cell as usize + usize::from(hit.primitive.half)];
         let [a, b] = weights(&patch.rates, hit);
         if a.min(b).min(1.0 - a - b) < -1e-4 {
             return Some(format!("u, v = {}, {} lie outside the triangle: weights {a}, {b}", hit.u, hit.v));
@@ -101,7 +103,7 @@ impl<'w> BruteForce<'w> {
                     let doubt = (view.uncertainty + seen.rounding(view.t)) / seen.direction.length();
                     let nearer = view.t > doubt && view.t + doubt < f64::from(t);
                     let is_there = || !mesh.surface().edited().hide_cell(patch.id, &patch.rates, k as u32 / 2);
-                    view.inside > SLACK && nearer && ray.from != Some(name(id, patch.id, k)) && is_there()
+                    view.inside > SLACK && nearer && ray.from != Some(name(id, patch, k)) && is_there()
                 })?;
                 Some(format!("mesh {id}, patch {}, triangle {k} is before t = {t} and was not hit", patch.id))
             })
@@ -120,13 +122,15 @@ fn tessellate(mesh: &WorldMesh) -> Vec<Patch> {
     patches.collect()
 }
 
-fn name(mesh: MeshId, patch: PatchId, triangle: usize) -> PrimitiveRef {
-    PrimitiveRef { mesh, patch, cell: triangle as u32 / 2, half: (triangle % 2) as u8 }
+fn name(mesh: MeshId, patch: &Patch, triangle: usize) -> PrimitiveRef {
+    let (cell, n_u) = (triangle as u32 / 2, patch.rates.n_u);
+    let cell = [cell % n_u, cell / n_u].map(|c| c as u16);
+    PrimitiveRef { mesh, patch: patch.id, cell, half: (triangle % 2) as u8 }
 }
 
 /// Weights of the triangle's second and third vertex at the hit's u and v.
 fn weights(rates: &PatchRates, hit: &Hit) -> [f64; 2] {
-    let (i, j) = (hit.primitive.cell % rates.n_u, hit.primitive.cell / rates.n_u);
+    let [i, j] = hit.primitive.cell;
     let a = f64::from(hit.u) * f64::from(rates.n_u) - f64::from(i);
     let b = f64::from(hit.v) * f64::from(rates.n_v) - f64::from(j);
     if hit.primitive.half == 0 { [a, b] } else { [1.0 - a, 1.0 - b] }

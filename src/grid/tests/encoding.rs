@@ -2,6 +2,7 @@
 
 use super::support::{Piece, Random, sheet, whole};
 use crate::grid::{CellRect, PieceLayout, PieceView, VertexFormat};
+use crate::math::LatticeGrid;
 
 #[test]
 fn every_vertex_comes_back_in_every_format_and_size() {
@@ -10,7 +11,8 @@ fn every_vertex_comes_back_in_every_format_and_size() {
         for (n_u, n_v) in (1..=8).flat_map(|u| (1..=8).map(move |v| (u, v))) {
             let vertices = sheet(&mut random, n_u.into(), n_v.into(), width);
             let piece = Piece::new(&vertices, CellRect { i0: 16, j0: 24, i1: 16 + n_u, j1: 24 + n_v });
-            let layout = PieceLayout::new(&vertices, piece.view().cells());
+            let grid = LatticeGrid::from_points(&vertices, usize::from(n_u) + 1);
+            let layout = PieceLayout::new(&grid, piece.view().cells(), [64; 2]);
             assert_eq!(layout.format(), format, "{n_u} x {n_v}");
             for (at, v) in vertices.iter().enumerate() {
                 let (i, j) = (at % usize::from(n_u + 1), at / usize::from(n_u + 1));
@@ -24,7 +26,7 @@ fn every_vertex_comes_back_in_every_format_and_size() {
 fn a_piece_as_wide_as_the_lattice_takes_four_bytes() {
     let ends = [[-(1 << 24); 3], [1 << 24; 3], [0; 3], [1 << 24, 0, -(1 << 24)]];
     let piece = Piece::new(&ends, whole(1, 1));
-    assert_eq!(PieceLayout::new(&ends, whole(1, 1)).format(), VertexFormat::Four);
+    assert_eq!(PieceLayout::new(&LatticeGrid::from_points(&ends, 2), whole(1, 1), [1; 2]).format(), VertexFormat::Four);
     assert_eq!([0, 1, 2, 3].map(|v| piece.view().vertex(v % 2, v / 2)), ends);
 }
 
@@ -33,7 +35,7 @@ fn a_triangle_takes_at_most_eight_bytes_at_eight_by_eight_cells() {
     let bytes = |width: i32| {
         let mut vertices = [[0; 3]; 81];
         vertices[80] = [width; 3];
-        PieceLayout::new(&vertices, whole(8, 8)).bytes()
+        PieceLayout::new(&LatticeGrid::from_points(&vertices, 9), whole(8, 8), [8; 2]).bytes()
     };
     let triangles = 128;
     assert_eq!((bytes(0), bytes(0xffff)), (5 * triangles, 5 * triangles));
@@ -46,8 +48,8 @@ fn a_triangle_takes_at_most_eight_bytes_at_eight_by_eight_cells() {
 #[should_panic(expected = "a whole piece")]
 fn a_cut_piece_is_refused() {
     let block = [[0u64; 8]; 10];
-    let vertices = [[0; 3]; 81];
+    let vertices = LatticeGrid::from_points(&[[0; 3]; 81], 9);
     let mut bytes = block;
-    PieceLayout::new(&vertices, whole(8, 8)).encode(&vertices, bytemuck::cast_slice_mut(&mut bytes));
+    PieceLayout::new(&vertices, whole(8, 8), [8; 2]).encode(&vertices, bytemuck::cast_slice_mut(&mut bytes));
     PieceView::new(&bytemuck::cast_slice(&bytes)[..576]);
 }

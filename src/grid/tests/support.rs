@@ -1,6 +1,7 @@
 //! Random numbers, blocks of bytes and wavy grids.
 
 use crate::grid::{CellRect, PieceLayout, PieceView};
+use crate::math::LatticeGrid;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
@@ -37,9 +38,10 @@ pub struct Piece(Vec<Line>);
 
 impl Piece {
     pub fn new(vertices: &[[i32; 3]], cells: CellRect) -> Self {
-        let layout = PieceLayout::new(vertices, cells);
+        let vertices = LatticeGrid::from_points(vertices, cells.size()[0] + 1);
+        let layout = PieceLayout::new(&vertices, cells, [cells.i1, cells.j1]);
         let mut lines = vec![Line([0xa5; 64]); layout.bytes() / 64];
-        layout.encode(vertices, bytemuck::cast_slice_mut(&mut lines));
+        layout.encode(&vertices, bytemuck::cast_slice_mut(&mut lines));
         Self(lines)
     }
 

@@ -43,6 +43,7 @@ macro_rules! in_registers {
 
 impl Kernel for Avx2 {
     type F = __m256;
+    type D = __m256d;
 
     #[inline(always)]
     fn splat(self, x: f32) -> __m256 {
@@ -104,6 +105,69 @@ impl Kernel for Avx2 {
     #[inline(always)]
     fn pick_1201(self, a: __m256, b: __m256) -> __m256 {
         in_registers!(_mm256_shuffle_ps::<0b01_00_10_01>(a, b))
+    }
+    #[inline(always)]
+    fn splat4(self, x: f64) -> __m256d {
+        in_registers!(_mm256_set1_pd(x))
+    }
+    #[inline(always)]
+    fn load4(self, x: &[f64; 4]) -> __m256d {
+        // SAFETY: `self` proves AVX2; `x` is 32 readable bytes and the load needs no alignment.
+        unsafe { _mm256_loadu_pd(x.as_ptr()) }
+    }
+    #[inline(always)]
+    fn store4(self, x: __m256d) -> [f64; 4] {
+        let mut out = [0.0; 4];
+        // SAFETY: `self` proves AVX2; `out` is 32 writable bytes and the store needs no alignment.
+        unsafe { _mm256_storeu_pd(out.as_mut_ptr(), x) };
+        out
+    }
+    #[inline(always)]
+    fn add4(self, a: __m256d, b: __m256d) -> __m256d {
+        in_registers!(_mm256_add_pd(a, b))
+    }
+    #[inline(always)]
+    fn sub4(self, a: __m256d, b: __m256d) -> __m256d {
+        in_registers!(_mm256_sub_pd(a, b))
+    }
+    #[inline(always)]
+    fn mul4(self, a: __m256d, b: __m256d) -> __m256d {
+        in_registers!(_mm256_mul_pd(a, b))
+    }
+    #[inline(always)]
+    fn min4(self, a: __m256d, b: __m256d) -> __m256d {
+        in_registers!(_mm256_min_pd(a, b))
+    }
+    #[inline(always)]
+    fn max4(self, a: __m256d, b: __m256d) -> __m256d {
+        in_registers!(_mm256_max_pd(a, b))
+    }
+    #[inline(always)]
+    fn floor4(self, x: __m256d) -> __m256d {
+        in_registers!(_mm256_floor_pd(x))
+    }
+    #[inline(always)]
+    fn lt4(self, a: __m256d, b: __m256d) -> u32 {
+        in_registers!(_mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a, b)) as u32)
+    }
+    #[inline(always)]
+    fn transposed_integers(self, x: [__m256d; 4]) -> [[i32; 4]; 3] {
+        // SAFETY: `self` proves AVX2; only `out` is written, 16 bytes to each of its rows.
+        unsafe {
+            let [a, b, c, d] = [
+                _mm256_cvttpd_epi32(x[0]),
+                _mm256_cvttpd_epi32(x[1]),
+                _mm256_cvttpd_epi32(x[2]),
+                _mm256_cvttpd_epi32(x[3]),
+            ];
+            let (ab, cd) = (_mm_unpacklo_epi32(a, b), _mm_unpacklo_epi32(c, d));
+            let (ab_high, cd_high) = (_mm_unpackhi_epi32(a, b), _mm_unpackhi_epi32(c, d));
+            let mut out = [[0; 4]; 3];
+            _mm_storeu_si128(out[0].as_mut_ptr().cast(), _mm_unpacklo_epi64(ab, cd));
+            _mm_storeu_si128(out[1].as_mut_ptr().cast(), _mm_unpackhi_epi64(ab, cd));
+            _mm_storeu_si128(out[2].as_mut_ptr().cast(), _mm_unpacklo_epi64(ab_high, cd_high));
+            out
+        }
     }
     #[inline(always)]
     unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> __m256 {

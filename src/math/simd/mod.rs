@@ -25,6 +25,8 @@ pub use portable::Portable;
 pub trait Kernel: Copy + Send + Sync + 'static {
     /// Eight floats.
     type F: Copy;
+    /// Four doubles: a point and a lane to spare.
+    type D: Copy;
 
     /// `x` in every lane.
     fn splat(self, x: f32) -> Self::F;
@@ -54,6 +56,30 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn pick_0112(self, a: Self::F, b: Self::F) -> Self::F;
     /// In each half of four lanes, `[a1, a2, b0, b1]`.
     fn pick_1201(self, a: Self::F, b: Self::F) -> Self::F;
+
+    /// `x` in every lane.
+    fn splat4(self, x: f64) -> Self::D;
+    /// The four doubles at `x`.
+    fn load4(self, x: &[f64; 4]) -> Self::D;
+    /// The lanes as an array.
+    fn store4(self, x: Self::D) -> [f64; 4];
+    /// Lanewise sum.
+    fn add4(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Lanewise difference.
+    fn sub4(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Lanewise product.
+    fn mul4(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Lanewise `if a < b { a } else { b }`.
+    fn min4(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Lanewise `if a > b { a } else { b }`.
+    fn max4(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Lanewise the greatest whole number that is not above.
+    fn floor4(self, x: Self::D) -> Self::D;
+    /// Bit k is set where `a < b` in lane k.
+    fn lt4(self, a: Self::D, b: Self::D) -> u32;
+    /// Lanes 0, 1 and 2 of four lists of whole numbers below 2^31 in magnitude: first all lanes 0, then all lanes 1, then all
+    /// lanes 2.
+    fn transposed_integers(self, x: [Self::D; 4]) -> [[i32; 4]; 3];
 
     /// Two runs of four little-endian unsigned integers of `BYTES` bytes each (2, 3 or 4), at `at[0]` and `at[1]`; `base` is added to each
     /// (wrapping) and the sums are converted to floats.

@@ -15,12 +15,18 @@ fn zip(a: [f32; 8], b: [f32; 8], op: impl Fn(f32, f32) -> f32) -> [f32; 8] {
 }
 
 #[inline(always)]
+fn zip4(a: [f64; 4], b: [f64; 4], op: impl Fn(f64, f64) -> f64) -> [f64; 4] {
+    [op(a[0], b[0]), op(a[1], b[1]), op(a[2], b[2]), op(a[3], b[3])]
+}
+
+#[inline(always)]
 fn mask(a: [f32; 8], b: [f32; 8], holds: impl Fn(f32, f32) -> bool) -> u32 {
     (0..8).fold(0, |m, k| m | (u32::from(holds(a[k], b[k])) << k))
 }
 
 impl Kernel for Portable {
     type F = [f32; 8];
+    type D = [f64; 4];
 
     #[inline(always)]
     fn splat(self, x: f32) -> [f32; 8] {
@@ -77,6 +83,50 @@ impl Kernel for Portable {
     #[inline(always)]
     fn pick_1201(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
         [a[1], a[2], b[0], b[1], a[5], a[6], b[4], b[5]]
+    }
+    #[inline(always)]
+    fn splat4(self, x: f64) -> [f64; 4] {
+        [x; 4]
+    }
+    #[inline(always)]
+    fn load4(self, x: &[f64; 4]) -> [f64; 4] {
+        *x
+    }
+    #[inline(always)]
+    fn store4(self, x: [f64; 4]) -> [f64; 4] {
+        x
+    }
+    #[inline(always)]
+    fn add4(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        zip4(a, b, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub4(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        zip4(a, b, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul4(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        zip4(a, b, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn min4(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        zip4(a, b, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max4(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        zip4(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn floor4(self, x: [f64; 4]) -> [f64; 4] {
+        x.map(f64::floor)
+    }
+    #[inline(always)]
+    fn lt4(self, a: [f64; 4], b: [f64; 4]) -> u32 {
+        (0..4).fold(0, |m, k| m | (u32::from(a[k] < b[k]) << k))
+    }
+    #[inline(always)]
+    fn transposed_integers(self, x: [[f64; 4]; 4]) -> [[i32; 4]; 3] {
+        from_fn(|axis| from_fn(|i| x[i][axis] as i32))
     }
     #[inline(always)]
     unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> [f32; 8] {

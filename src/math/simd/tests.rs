@@ -51,3 +51,43 @@ fn the_detected_kernel_gives_the_bits_of_the_portable_one() {
         assert_eq!(run(Round(seed)), Round(seed).run(Portable), "seed {seed}");
     }
 }
+
+/// As [`Round`], for doubles.
+struct RoundOfDoubles(u32);
+
+impl Task for RoundOfDoubles {
+    type Output = Vec<u64>;
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> Vec<u64> {
+        let awkward = |seed| -> [f64; 4] { std::array::from_fn(|i| f64::from(awkward(seed)[i]) * 1.1) };
+        let (a, b) = (k.load4(&awkward(self.0)), k.load4(&awkward(self.0 / 3 + 5)));
+        let doubles = [
+            k.splat4(f64::from(self.0)),
+            k.add4(a, b),
+            k.sub4(a, b),
+            k.mul4(a, b),
+            k.min4(a, b),
+            k.max4(a, b),
+            k.floor4(a),
+        ];
+        let whole = |i: u32| k.floor4(k.splat4(f64::from(self.0) * 7.3 - f64::from(i) * 1e5));
+        let integers = k.transposed_integers([whole(0), whole(1), a_point(k, self.0), whole(2)]);
+        let canonical = |x: f64| if x.is_nan() { f64::NAN.to_bits() } else { x.to_bits() };
+        let lanes = doubles.into_iter().flat_map(|d| k.store4(d).map(canonical));
+        lanes.chain(integers.into_iter().flatten().map(|i| i as u64)).chain([u64::from(k.lt4(a, b))]).collect()
+    }
+}
+
+/// Three different whole numbers.
+#[inline(always)]
+fn a_point<K: Kernel>(k: K, seed: u32) -> K::D {
+    let seed = f64::from(seed);
+    k.load4(&[seed - 16_777_216.0, 16_777_216.0 - seed, -seed, 0.0])
+}
+
+#[test]
+fn the_detected_kernel_gives_the_bits_of_the_portable_one_for_doubles() {
+    for seed in 0..2000 {
+        assert_eq!(run(RoundOfDoubles(seed)), RoundOfDoubles(seed).run(Portable), "seed {seed}");
+    }
+}

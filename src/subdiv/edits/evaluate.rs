@@ -2,7 +2,8 @@
 
 use super::EditTree;
 use crate::math::DBounds;
-use crate::subdiv::eval::{Evaluator, Point, SurfaceSample, Target, half_range, quarter};
+use crate::subdiv::bounds::half_range;
+use crate::subdiv::eval::{Evaluator, Point, SurfaceSample, Target, quarter, quarters_of};
 use crate::subdiv::plan::PlanLibrary;
 
 impl Evaluator {
@@ -27,12 +28,12 @@ impl Evaluator {
             }
             EditTree::Split(quarters) => {
                 let middle = self.middle(&target);
-                for (k, tree) in quarters.iter().enumerate() {
+                let wanted = quarters_of(&target, middle);
+                for (k, tree) in quarters.iter().enumerate().filter(|(k, _)| wanted >> k & 1 == 1) {
                     let mark = self.n_params();
-                    if let Some(part) = self.quarter_target(&target, middle, k) {
-                        self.walk_tree(library, tree, depth + 1, part, out);
-                        self.truncate_params(mark);
-                    }
+                    let part = self.quarter_target(&target, middle, k);
+                    self.walk_tree(library, tree, depth + 1, part, out);
+                    self.truncate_params(mark);
                 }
             }
         }

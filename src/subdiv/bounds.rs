@@ -1,0 +1,109 @@
+//! Conservative boxes of parts of patches, without evaluating them.
+
+use super::eval::{Evaluator, Point, quarter};
+use super::plan::{NodeId, Plan, PlanLibrary};
+use super::products::control_points;
+use super::regular::{self, BezierWeights, ControlPoints, bezier_weights};
+use crate::math::DBounds;
+use crate::math::simd;
+
+/// Weights of the last ranges along u and v: neighbouring parts of a patch have one of them in common.
+#[derive(Debug)]
+pub(super) struct HullWeights {
+    ranges: [[f64; 2]; 2],
+    weights: [BezierWeights; 2],
+}
+
+impl Default for HullWeights {
+    fn default() -> Self {
+        Self { ranges: [[0.0, 1.0]; 2], weights: [bezier_weights([0.0, 1.0]); 2] }
+    }
+}
+
+impl HullWeights {
+    fn get(&mut self, u: [f64; 2], v: [f64; 2]) -> [&BezierWeights; 2] {
+        for (k, range) in [u, v].into_iter().enumerate() {
+            if self.ranges[k] != range {
+                self.ranges[k] = range;
+                self.weights[k] = bezier_weights(range);
+            }
+        }
+        [&self.weights[0], &self.weights[1]]
+    }
+}
+
+impl Evaluator {
+    /// A box that holds the part `[u0,u1] x [v0,v1]` of the patch: the Bézier hulls of its regular parts, and ring hulls
+    /// `depth` splits below the patch, or where the surface is known to lie in them.
+    pub fn bounds(
+        &mut self,
+        library: &PlanLibrary,
+        node: NodeId,
+        ring: &[Point],
+        u: [f64; 2],
+        v: [f64; 2],
+        depth: u32,
+    ) -> DBounds {
+        let ring = self.start_ring(ring);
+        let mut bounds = DBounds::EMPTY;
+        self.bound(library, node, ring, u, v, depth, &mut bounds);
+        bounds
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn bound(
+        &mut self,
+        library: &PlanLibrary,
+        node: NodeId,
+        ring: usize,
+        u: [f64; 2],
+        v: [f64; 2],
+        depth: u32,
+        bounds: &mut DBounds,
+    ) {
+        match library.plan(node) {
+            Plan::Regular(rows) => {
+                let control = control_points(library.rows(), *rows, &self.points[ring..]);
+                self.grow_by_hull(bounds, &control, u, v);
+            }
+            Plan::Split { in_hull: true, .. } if depth == 0 => {
+                let n = library.n_points(node);
+                self.points[ring..ring + n].iter().for_each(|p| bounds.grow(p.to_vec()));
+            }
+            Plan::Split { rows, children, .. } => {
+                let start = self.points.len();
+                let halves = [half_range(u, 0.0), half_range(u, 1.0), half_range(v, 0.0), half_range(v, 1.0)];
+                let n_quarters = [0, 1, 2, 3].map(|k| usize::from(halves[k].is_some()));
+                let is_alone = (n_quarters[0] + n_quarters[1]) * (n_quarters[2] + n_quarters[3]) == 1;
+                let refined = if is_alone { None } else { Some(self.refine(library, *rows, ring)) };
+                let mark = self.points.len();
+                for (k, child) in children.iter().enumerate() {
+                    let (x, y) = quarter(k);
+                    let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) else { continue };
+                    let child_ring = match refined {
+                        Some(refined) => self.push_child(library, child, refined),
+                        None => self.refine_child(library, *rows, child, ring),
+                    };
+                    self.bound(library, child.node, child_ring, u, v, depth.saturating_sub(1), bounds);
+                    self.points.truncate(mark);
+                }
+                self.points.truncate(start);
+            }
+        }
+    }
+
+    /// Enlarges `bounds` by the Bézier hull of a part of a regular patch.
+    pub fn grow_by_hull(&mut self, bounds: &mut DBounds, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) {
+        let [u, v] = self.hulls.get(u, v);
+        for p in simd::run(regular::Hull { control, u, v }) {
+            bounds.grow(p.to_vec());
+        }
+    }
+}
+
+/// The part of a parameter range that lies in the lower (0) or upper (1) half, as the half sees it. Where a range only
+/// touches a half, the other one answers for the border.
+pub(super) fn half_range([a, b]: [f64; 2], offset: f64) -> Option<[f64; 2]> {
+    let has_part = if offset == 0.0 { a < 0.5 } else { b > 0.5 || a >= 0.5 };
+    has_part.then(|| [(2.0 * a - offset).max(0.0), (2.0 * b - offset).min(1.0)])
+}

@@ -1,0 +1,316 @@
+//! Rows of sparse matrices, packed: what a plan library mostly consists of.
+//!
+//! Few rows differ in their **weights** (a mesh with hundreds of nodes has a few hundred lists of weights), so that each
+//! distinct list, a **mask**, is kept once, in f64. A row is a mask and its columns, two bytes each as long as no ring has
+//! more than 65,536 points.
+
+use super::rules::Row;
+use rustc_hash::FxHashMap;
+
+/// Rows of a [`RowStore`], one after the other.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SparseRows {
+    first: u32,
+    len: u32,
+}
+
+impl SparseRows {
+    /// Number of rows.
+    #[inline(always)]
+    pub fn len(self) -> usize {
+        self.len as usize
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(self) -> bool {
+        self.len == 0
+    }
+}
+
+/// A list of indices in a [`RowStore`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Span {
+    first: u32,
+    len: u32,
+}
+
+impl Span {
+    /// Number of indices.
+    #[inline(always)]
+    pub fn len(self) -> usize {
+        self.len as usize
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(self) -> bool {
+        self.len == 0
+    }
+}
+
+/// A row: where its columns start, and its mask, which knows how many there are.
+#[derive(Clone, Copy, Debug)]
+struct PackedRow {
+    columns: u32,
+    mask: u32,
+}
+
+/// Where a mask's weights are.
+#[derive(Clone, Copy, Debug)]
+struct Mask {
+    first: u32,
+    len: u32,
+}
+
+/// Column numbers and other indices of points.
+#[derive(Clone, Debug)]
+enum Indices {
+    Narrow(Vec<u16>),
+    /// Once a ring has had more points than 16 bits can tell apart.
+    Wide(Vec<u32>),
+}
+
+/// The rows of all nodes of a library.
+#[derive(Clone, Debug)]
+pub struct RowStore {
+    rows: Vec<PackedRow>,
+    masks: Vec<Mask>,
+    weights: Vec<f64>,
+    indices: Indices,
+    /// Masks by the bits of their weights, while rows are added.
+    known: FxHashMap<Vec<u64>, u32>,
+}
+
+impl Default for RowStore {
+    fn default() -> Self {
+        Self {
+            rows: Vec::new(),
+            masks: Vec::new(),
+            weights: Vec::new(),
+            indices: Indices::Narrow(Vec::new()),
+            known: FxHashMap::default(),
+        }
+    }
+}
+
+/// An index of either width.
+pub(super) trait Index: Copy {
+    fn idx(self) -> usize;
+}
+
+impl Index for u16 {
+    #[inline(always)]
+    fn idx(self) -> usize {
+        usize::from(self)
+    }
+}
+
+impl Index for u32 {
+    #[inline(always)]
+    fn idx(self) -> usize {
+        self as usize
+    }
+}
+
+impl Indices {
+    fn len(&self) -> usize {
+        match self {
+            Indices::Narrow(indices) => indices.len(),
+            Indices::Wide(indices) => indices.len(),
+        }
+    }
+
+    fn get(&self, i: usize) -> u32 {
+        match self {
+            Indices::Narrow(indices) => u32::from(indices[i]),
+            Indices::Wide(indices) => indices[i],
+        }
+    }
+
+    fn push(&mut self, index: u32) {
+        match (&mut *self, u16::try_from(index)) {
+            (Indices::Narrow(indices), Ok(index)) => indices.push(index),
+            (Indices::Wide(indices), _) => indices.push(index),
+            (Indices::Narrow(indices), Err(_)) => {
+                let mut wide: Vec<u32> = indices.iter().map(|&i| u32::from(i)).collect();
+                wide.push(index);
+                *self = Indices::Wide(wide);
+            }
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        match self {
+            Indices::Narrow(indices) => 2 * indices.len(),
+            Indices::Wide(indices) => 4 * indices.len(),
+        }
+    }
+}
+
+/// Rows and the store that they are in, its indices of a known width: what inner loops take.
+#[derive(Clone, Copy)]
+pub(super) struct RowsView<'s, I> {
+    rows: &'s [PackedRow],
+    masks: &'s [Mask],
+    weights: &'s [f64],
+    indices: &'s [I],
+}
+
+impl<'s, I: Index> RowsView<'s, I> {
+    /// Columns and weights of row `i`.
+    #[inline(always)]
+    pub fn row(&self, i: usize) -> (&'s [I], &'s [f64]) {
+        let PackedRow { columns, mask } = self.rows[i];
+        let Mask { first, len } = self.masks[mask as usize];
+        let (columns, first, len) = (columns as usize, first as usize, len as usize);
+        (&self.indices[columns..columns + len], &self.weights[first..first + len])
+    }
+}
+
+/// Does something with a [`RowsView`] and the store's indices, of either width.
+macro_rules! with_rows {
+    ($store:expr, $rows:expr, |$view:ident, $indices:ident| $body:expr) => {
+        match $store.widths() {
+            $crate::subdiv::rows::Width::Narrow($indices) => {
+                let $view = $store.view($rows, $indices);
+                $body
+            }
+            $crate::subdiv::rows::Width::Wide($indices) => {
+                let $view = $store.view($rows, $indices);
+                $body
+            }
+        }
+    };
+}
+pub(super) use with_rows;
+
+#[inline(always)]
+fn copy_listed<T: Copy, I: Index>(list: &[I], from: &[T], to: &mut [T]) {
+    for (to, i) in to.iter_mut().zip(list) {
+        *to = from[i.idx()];
+    }
+}
+
+/// The indices of a store.
+pub(super) enum Width<'s> {
+    Narrow(&'s [u16]),
+    Wide(&'s [u32]),
+}
+
+impl RowStore {
+    /// Adds rows, columns and weights as they are.
+    pub fn push<'a>(&mut self, rows: impl IntoIterator<Item = &'a Row>) -> SparseRows {
+        let first = self.rows.len() as u32;
+        for row in rows {
+            let columns = self.indices.len() as u32;
+            row.iter().for_each(|&(column, _)| self.indices.push(column));
+            let mask = self.mask(row);
+            self.rows.push(PackedRow { columns, mask });
+        }
+        SparseRows { first, len: self.rows.len() as u32 - first }
+    }
+
+    /// Adds a list of indices.
+    pub fn push_indices(&mut self, indices: &[u32]) -> Span {
+        let first = self.indices.len() as u32;
+        indices.iter().for_each(|&i| self.indices.push(i));
+        Span { first, len: indices.len() as u32 }
+    }
+
+    fn mask(&mut self, row: &Row) -> u32 {
+        let bits: Vec<u64> = row.iter().map(|&(_, w)| w.to_bits()).collect();
+        *self.known.entry(bits).or_insert_with(|| {
+            self.masks.push(Mask { first: self.weights.len() as u32, len: row.len() as u32 });
+            self.weights.extend(row.iter().map(|&(_, w)| w));
+            self.masks.len() as u32 - 1
+        })
+    }
+
+    /// Row `i` of some rows.
+    pub fn row(&self, rows: SparseRows, i: usize) -> Row {
+        with_rows!(self, rows, |view, _indices| {
+            let (columns, weights) = view.row(i);
+            columns.iter().zip(weights).map(|(c, &w)| (c.idx() as u32, w)).collect()
+        })
+    }
+
+    /// Index `i` of a list.
+    #[inline(always)]
+    pub fn index(&self, list: Span, i: usize) -> usize {
+        self.indices.get(list.first as usize + i) as usize
+    }
+
+    #[inline(always)]
+    pub(super) fn widths(&self) -> Width<'_> {
+        match &self.indices {
+            Indices::Narrow(indices) => Width::Narrow(indices),
+            Indices::Wide(indices) => Width::Wide(indices),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn view<'s, I>(&'s self, rows: SparseRows, indices: &'s [I]) -> RowsView<'s, I> {
+        RowsView {
+            rows: &self.rows[rows.first as usize..][..rows.len()],
+            masks: &self.masks,
+            weights: &self.weights,
+            indices,
+        }
+    }
+
+    /// A list of indices, of which [`widths`](Self::widths) gave the width.
+    #[inline(always)]
+    pub(super) fn list<'s, I>(&self, list: Span, indices: &'s [I]) -> &'s [I] {
+        &indices[list.first as usize..][..list.len()]
+    }
+
+    /// Copies the listed ones of `from` to `to`, which is as long as the list.
+    #[inline]
+    pub(super) fn gather<T: Copy>(&self, list: Span, from: &[T], to: &mut [T]) {
+        match self.widths() {
+            Width::Narrow(indices) => copy_listed(self.list(list, indices), from, to),
+            Width::Wide(indices) => copy_listed(self.list(list, indices), from, to),
+        }
+    }
+
+    /// Drops what only adding needs.
+    pub fn seal(&mut self) {
+        self.known = FxHashMap::default();
+        self.rows.shrink_to_fit();
+        self.masks.shrink_to_fit();
+        self.weights.shrink_to_fit();
+        match &mut self.indices {
+            Indices::Narrow(indices) => indices.shrink_to_fit(),
+            Indices::Wide(indices) => indices.shrink_to_fit(),
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let known: usize = self.known.keys().map(|k| 8 * k.len() + 40).sum();
+        known
+            + size_of_val(&self.rows[..])
+            + size_of_val(&self.masks[..])
+            + size_of_val(&self.weights[..])
+            + self.indices.bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_come_back_as_they_went_in_whatever_their_width() {
+        let mut store = RowStore::default();
+        let few: Vec<Row> = vec![vec![(3, 0.25), (1, 0.75)], vec![(7, 0.25), (2, 0.75)], vec![]];
+        let narrow = store.push(&few);
+        assert_eq!(store.masks.len(), 2, "equal weights are kept once");
+        let wide = store.push([&vec![(70_000, 1.5)]]);
+        let list = store.push_indices(&[5, 100_000]);
+        for (i, row) in few.iter().enumerate() {
+            assert_eq!(&store.row(narrow, i), row);
+        }
+        assert_eq!(store.row(wide, 0), vec![(70_000, 1.5)]);
+        assert_eq!([store.index(list, 0), store.index(list, 1)], [5, 100_000]);
+    }
+}
