@@ -12,6 +12,10 @@ use crossbeam::utils::CachePadded;
 const USED_BITS: u32 = 30;
 const USED_MASK: u64 = (1 << USED_BITS) - 1;
 
+/// Lines that a hint asks for: all of a small block with its child words, the beginning of a large one.
+#[cfg(all(not(loom), target_arch = "x86_64"))]
+const PREFETCHED_LINES: usize = 3;
+
 /// Why a block found no place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum NoPlace {
@@ -264,11 +268,12 @@ impl Arena {
         {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
             // SAFETY: a prefetch accesses nothing; the address is inside the arena because `first` was reserved. The
-            // line after it may be one past the end, hence the wrapping add.
+            // lines after it may be past the end, hence the wrapping add.
             unsafe {
                 let start = self.memory.line(first).cast::<i8>();
-                _mm_prefetch(start, _MM_HINT_T0);
-                _mm_prefetch(start.wrapping_add(LINE), _MM_HINT_T0);
+                for line in 0..PREFETCHED_LINES {
+                    _mm_prefetch(start.wrapping_add(line * LINE), _MM_HINT_T0);
+                }
             }
         }
         #[cfg(not(target_arch = "x86_64"))]

@@ -148,10 +148,15 @@ impl Head {
         let mut t_near = [0.0; 16];
         let slabs = Slabs::new(self, ray);
         let (low, low_t) = slabs.test(kernel, self, 0, t_max);
-        let (high, high_t) = slabs.test(kernel, self, 8, t_max);
         t_near[..8].copy_from_slice(&low_t);
-        t_near[8..].copy_from_slice(&high_t);
-        LaneHits { mask: (low | high << 8) & lane_mask(self.lanes), t_near }
+        let mut mask = low;
+        // Lanes from 8 on are the third and fourth row.
+        if self.lanes[1] > 2 {
+            let (high, high_t) = slabs.test(kernel, self, 8, t_max);
+            t_near[8..].copy_from_slice(&high_t);
+            mask |= high << 8;
+        }
+        LaneHits { mask: mask & lane_mask(self.lanes), t_near }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Rays against the triangles of a piece: eight at a time, watertight (Woop, Benthin, Wald: "Watertight Ray/Triangle Intersection", 2013).
 #![allow(unsafe_code)]
 
-use super::boxes::LaneHits;
+use super::boxes::{HEAD_BYTES, LaneHits};
 use super::{LatticeHit, LatticeRay, PieceView, TriangleId};
 use crate::ids::PatchId;
 use crate::math::simd::Kernel;
@@ -13,6 +13,7 @@ impl PieceView<'_> {
     #[inline(always)]
     pub fn closest<K: Kernel>(&self, kernel: K, ray: &LatticeRay, patch: PatchId, hit: &mut LatticeHit) -> bool {
         let before = hit.triangle;
+        self.prefetch(kernel);
         let mut blocks = self.head.test(kernel, ray, hit.t);
         while let Some(lane) = blocks.pop_nearest(hit.t) {
             let Some(found) = self.test_block(kernel, ray, lane, hit.t) else { continue };
@@ -32,9 +33,22 @@ impl PieceView<'_> {
         is_nearer
     }
 
+    /// Asks for the vertices while the boxes are tested: a piece is visited once or twice by a ray and then left, so that
+    /// its lines are seldom near. Measured on trex at rate 16: diffuse rays 1.2 times as fast, shuffled ones 1.27 times.
+    #[inline(always)]
+    fn prefetch<K: Kernel>(&self, kernel: K) {
+        /// Lines of a piece of 8 x 8 cells at 16 bits.
+        const LINES: usize = 10;
+        let lines: *const [u8; 64] = self.bytes.as_ptr().cast();
+        for line in HEAD_BYTES / 64..LINES {
+            kernel.prefetch(lines.wrapping_add(line));
+        }
+    }
+
     /// Whether the ray hits anything of the piece.
     #[inline(always)]
     pub fn occluded<K: Kernel>(&self, kernel: K, ray: &LatticeRay, patch: PatchId) -> bool {
+        self.prefetch(kernel);
         let mut blocks = self.head.test(kernel, ray, ray.t_max);
         while let Some(lane) = blocks.pop() {
             let found = self.test_block(kernel, ray, lane, ray.t_max);

@@ -200,10 +200,16 @@ const MAX_LEVELS: usize = 5;
 
 impl<'v> Level<'v> {
     #[inline(always)]
-    fn new<K: Kernel>(kernel: K, block: Block<'v>, ray: &LatticeRay, t_max: f32) -> Self {
+    fn new<K: Kernel>(kernel: K, visit: &Visit<'_>, block: Block<'v>, ray: &LatticeRay, t_max: f32) -> Self {
         let node = NodeView::new(block.bytes());
         let cells = node.cells();
-        Self { block, cells, side: child_side(cells), hits: node.test(kernel, ray, t_max) }
+        let hits = node.test(kernel, ray, t_max);
+        let mut lanes = hits.mask;
+        while lanes != 0 {
+            visit.prefetch(block.child(lanes.trailing_zeros() as usize));
+            lanes &= lanes - 1;
+        }
+        Self { block, cells, side: child_side(cells), hits }
     }
 
     #[inline(always)]
@@ -275,7 +281,7 @@ fn closest_in_patch<K: Kernel>(
         return;
     }
     let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
-    levels[0] = Some(Level::new(kernel, root, ray, hit.t));
+    levels[0] = Some(Level::new(kernel, visit, root, ray, hit.t));
     let mut depth = 0;
     while let Some(level) = &mut levels[depth] {
         let Some(lane) = level.hits.pop_nearest(hit.t) else {
@@ -288,7 +294,7 @@ fn closest_in_patch<K: Kernel>(
         let block = builder.fetch_child(visit, of, level, lane, depth + 1);
         if is_node(block.bytes()) {
             depth += 1;
-            levels[depth] = Some(Level::new(kernel, block, ray, hit.t));
+            levels[depth] = Some(Level::new(kernel, visit, block, ray, hit.t));
         } else {
             PieceView::new(block.bytes()).closest(kernel, ray, of.patch, hit);
         }
@@ -338,7 +344,7 @@ fn occluded_in_patch<K: Kernel>(
         return PieceView::new(root.bytes()).occluded(kernel, ray, of.patch);
     }
     let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
-    levels[0] = Some(Level::new(kernel, root, ray, ray.t_max()));
+    levels[0] = Some(Level::new(kernel, visit, root, ray, ray.t_max()));
     let mut depth = 0;
     while let Some(level) = &mut levels[depth] {
         let Some(lane) = level.hits.pop() else {
@@ -351,7 +357,7 @@ fn occluded_in_patch<K: Kernel>(
         let block = builder.fetch_child(visit, of, level, lane, depth + 1);
         if is_node(block.bytes()) {
             depth += 1;
-            levels[depth] = Some(Level::new(kernel, block, ray, ray.t_max()));
+            levels[depth] = Some(Level::new(kernel, visit, block, ray, ray.t_max()));
         } else if PieceView::new(block.bytes()).occluded(kernel, ray, of.patch) {
             return true;
         }
