@@ -72,6 +72,6 @@ impl<'v> Block<'v> {
     /// If there is no such child.
     #[inline(always)]
     pub fn child(&self, i: usize) -> Slot<'v> {
-        Slot::child(&self.words[i], self.tag)
+        Slot::child(&self.words[i], self.tag, self.bytes, i)
     }
 }

@@ -41,6 +41,12 @@ impl Memory {
         Some(Self { allocation: Some((start, layout)), first_line })
     }
 
+    /// Whether an address lies in the allocation.
+    pub(super) fn holds(&self, address: usize) -> bool {
+        self.allocation
+            .is_some_and(|(start, layout)| (start.addr().get()..start.addr().get() + layout.size()).contains(&address))
+    }
+
     /// The address of line `idx`, 64-byte aligned.
     ///
     /// # Safety

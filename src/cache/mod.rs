@@ -51,7 +51,9 @@
 //!
 //! **Recycling.** Who finds the current segment full makes the next one current, if every pin stands at `head + 1 - G`
 //! or later. Any number of threads may try at once. If a pin lags behind, or if the block is larger than a segment, the
-//! block is built in private memory of the visit and used once: a **bypass**. Blocks below it are bypassed, too.
+//! block is built in memory of the thread's own and seen by no other: a **bypass**. Blocks below it are bypassed, too.
+//! A thread remembers such blocks until there are [`SegmentCache::SCRATCH_BYTES`] of them, then forgets them all: without
+//! any cache, the next ray often needs what the last one has built.
 //!
 //! A thread that the system puts to sleep in the middle of a visit pins a segment until it runs again, which with more
 //! threads than processors is soon the state of them all. So a thread that was bypassed because of a pin gives up its
@@ -134,15 +136,15 @@ pub struct SegmentCache {
     ring: Ring,
     pins: pin::Pins,
     tag: CacheTag,
-    /// Child words of all blocks that are used once: nobody ever writes them.
+    /// Child words of all blocks of threads' own: nobody ever writes them.
     private_words: Box<[AtomicU64]>,
     reinsert: Reinsert,
     totals: Mutex<CacheStatistics>,
 }
 
 impl SegmentCache {
-    /// Bytes of private memory that a pin keeps from visit to visit, at most. During a visit it may need more: as much
-    /// as the blocks that this visit builds and that find no place in the cache.
+    /// Bytes of private memory that a pin keeps from visit to visit, about. During a visit it may need more: as much as
+    /// the blocks that this visit builds and that find no place in the cache.
     pub const SCRATCH_BYTES: usize = scratch::BYTES_KEPT;
 
     /// An empty cache. Its memory becomes resident as it is filled.

@@ -59,7 +59,7 @@ impl Pins {
 /// A thread's right to read the cache. Neither `Send` nor `Sync`.
 ///
 /// A pin that is idle for long should be [released](Pin::release): while it stands still it keeps the cache from
-/// recycling what it could read, and others build blocks for one use only.
+/// recycling what it could read, and others build blocks for themselves only.
 pub struct Pin<'c> {
     pub(super) cache: &'c SegmentCache,
     /// The pin word, `None` if there were more pins than expected: such a pin sees an empty cache and leaves it alone.
@@ -75,6 +75,8 @@ pub struct Pin<'c> {
     /// Whether a block of the last visit found no place because of another pin.
     pub(super) met_a_pin: Cell<bool>,
     pub(super) scratch: Scratch,
+    /// Tables that were gone when the scratch was last empty.
+    n_tables_gone: usize,
     pub(super) counters: Counters,
     not_send: PhantomData<*const ()>,
 }
@@ -94,6 +96,7 @@ impl<'c> Pin<'c> {
             },
             met_a_pin: Cell::new(false),
             scratch: Scratch::default(),
+            n_tables_gone: cache.tag.n_tables_gone(),
             counters: Counters::default(),
             not_send: PhantomData,
         }
@@ -104,7 +107,7 @@ impl<'c> Pin<'c> {
     #[inline]
     pub fn visit(&mut self) -> Visit<'_> {
         if self.scratch.is_used() {
-            self.end_private_blocks();
+            self.look_after_private_blocks();
         }
         if self.cache.ring.head() != self.age {
             self.move_to_head();
@@ -115,6 +118,10 @@ impl<'c> Pin<'c> {
     /// Lets go of everything until the next visit.
     pub fn release(&mut self) {
         self.scratch.clear();
+        self.unpin();
+    }
+
+    fn unpin(&mut self) {
         self.age = UNPINNED;
         self.first_readable = u64::MAX;
         if let Some(idx) = self.idx {
@@ -128,14 +135,19 @@ impl<'c> Pin<'c> {
         self.counters.statistics()
     }
 
-    /// Forgets the blocks that were built for the last visit. If some of them found no place because of another pin, that
-    /// pin's thread is probably asleep within its visit, and what it needs is a processor. So this thread steps aside, and does so between two visits, with its own pin released: then a
-    /// thread that does not run holds nothing. It does not wait for anything.
+    /// Forgets the blocks that this thread has built for itself, if there are too many of them or their slots may be
+    /// gone. If some of the last visit's found no place because of another pin, that pin's thread is probably asleep within
+    /// its visit, and what it needs is a processor. So this thread steps aside, and does so between two visits, with its own
+    /// pin released: then a thread that does not run holds nothing. It does not wait for anything.
     #[cold]
-    fn end_private_blocks(&mut self) {
-        self.scratch.clear();
+    fn look_after_private_blocks(&mut self) {
+        let n_tables_gone = self.cache.tag.n_tables_gone();
+        if self.scratch.is_full() || n_tables_gone != self.n_tables_gone {
+            self.scratch.clear();
+            self.n_tables_gone = n_tables_gone;
+        }
         if self.met_a_pin.take() {
-            self.release();
+            self.unpin();
             yield_now();
         }
     }

@@ -1,8 +1,11 @@
-//! A thread's own memory for blocks that are used once: it lasts as long as a visit.
+//! A thread's own memory, for blocks that find no place in the cache. They last at least as long as the visit that built
+//! them, and are **remembered** by the key of their slot until the memory is full: the next ray often needs the same.
 #![allow(unsafe_code)]
 
 use super::memory::{LINE, Memory};
+use rustc_hash::FxHashMap;
 use std::cell::{Cell, RefCell};
+use std::ptr::NonNull;
 
 /// Lines of an ordinary chunk: 64 KiB.
 const CHUNK_LINES: usize = 1024;
@@ -23,6 +26,14 @@ pub(super) struct Scratch {
     current: Cell<usize>,
     /// Lines used of the current chunk. Zero if and only if the whole scratch is empty.
     used: Cell<usize>,
+    remembered: RefCell<FxHashMap<usize, Remembered>>,
+}
+
+/// A block in a chunk.
+#[derive(Clone, Copy)]
+struct Remembered {
+    bytes: NonNull<[u8]>,
+    word_lines: usize,
 }
 
 impl Scratch {
@@ -47,6 +58,24 @@ impl Scratch {
         unsafe { std::slice::from_raw_parts_mut(chunks[self.current.get()].memory.line(first), lines * LINE) }
     }
 
+    /// Notes a block of this scratch, complete, as that of the slot with this key.
+    pub(super) fn remember(&self, key: usize, bytes: &[u8], word_lines: usize) {
+        self.remembered.borrow_mut().insert(key, Remembered { bytes: NonNull::from(bytes), word_lines });
+    }
+
+    /// The block noted for a key since the scratch was last empty, and its lines of child words.
+    pub(super) fn recall(&self, key: usize) -> Option<(&[u8], usize)> {
+        let Remembered { bytes, word_lines } = *self.remembered.borrow().get(&key)?;
+        // SAFETY: the bytes lie in a chunk, were complete when they were noted, and nobody has them to write; `clear`,
+        // which alone gives the lines out anew, forgets them and needs `&mut self`.
+        Some((unsafe { bytes.as_ref() }, word_lines))
+    }
+
+    /// Whether there is as much as may be kept from visit to visit.
+    pub(super) fn is_full(&self) -> bool {
+        self.current.get() >= CHUNKS_KEPT
+    }
+
     /// Whether there are blocks.
     #[inline(always)]
     pub(super) fn is_used(&self) -> bool {
@@ -55,6 +84,7 @@ impl Scratch {
 
     /// Forgets all blocks. Keeps a little memory for the next visit.
     pub(super) fn clear(&mut self) {
+        self.remembered.get_mut().clear();
         let mut kept = 0;
         self.chunks.get_mut().retain(|chunk| {
             kept += usize::from(chunk.lines == CHUNK_LINES);
@@ -91,6 +121,22 @@ mod tests {
             })
             .collect();
         assert!(filled.iter().all(|(i, slice)| slice.len() % LINE == 0 && slice.iter().all(|b| b == i)));
+    }
+
+    #[test]
+    fn a_block_is_remembered_until_the_scratch_is_cleared() {
+        let mut scratch = Scratch::default();
+        for key in 0..100 {
+            let bytes = scratch.bytes(64);
+            bytes.fill(key as u8);
+            scratch.remember(key, bytes, key % 3);
+        }
+        for key in 0..100 {
+            assert_eq!(scratch.recall(key), Some((&[key as u8; 64][..], key % 3)));
+        }
+        assert!(!scratch.is_full() && scratch.recall(100).is_none());
+        scratch.clear();
+        assert!(scratch.recall(7).is_none());
     }
 
     #[test]

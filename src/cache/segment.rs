@@ -62,6 +62,11 @@ impl Ring {
         self.head.load(Ordering::Acquire)
     }
 
+    /// Whether an address lies in the ring's memory, which is used for one block after the other.
+    pub(super) fn holds(&self, address: usize) -> bool {
+        self.arena.memory.holds(address)
+    }
+
     fn n_segments(&self) -> u64 {
         self.cursors.len() as u64
     }

@@ -12,7 +12,7 @@ const TIMED_BUILDS: u64 = 13;
 
 /// Counters summed over all pins that were dropped.
 ///
-/// `lookups = hits + misses()`, and every miss is one of compulsory, capacity, concurrent and bypassed-parent.
+/// `lookups = hits + private_hits + misses()`, and every miss is one of compulsory, capacity, concurrent and bypassed-parent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
 #[non_exhaustive]
 pub struct CacheStatistics {
@@ -20,23 +20,25 @@ pub struct CacheStatistics {
     pub lookups: u64,
     /// Blocks that were there.
     pub hits: u64,
+    /// Blocks that were not, but that the same thread had built for itself a little before.
+    pub private_hits: u64,
     /// Misses because nobody had built the block before.
     pub compulsory_misses: u64,
     /// Misses because the block, or the block its slot was in, had been recycled.
     pub capacity_misses: u64,
     /// Misses because another thread was building the block: this thread built it as well instead of waiting.
     pub concurrent_misses: u64,
-    /// Misses below a block that was used once, so that there was no place to look.
+    /// Misses below a block of one thread's own, so that there was no place to look.
     pub bypassed_parent_misses: u64,
     /// Blocks built and put into the cache.
     pub builds_kept: u64,
     /// Blocks built, then thrown away because another thread had built them in the meantime.
     pub builds_discarded: u64,
-    /// Blocks built and used once because they are larger than a segment.
+    /// Blocks built for one thread because they are larger than a segment.
     pub bypassed_too_large: u64,
-    /// Blocks built and used once because a pin kept the oldest segment.
+    /// Blocks built for one thread because a pin kept the oldest segment.
     pub bypassed_pinned: u64,
-    /// Blocks built and used once because their parent was.
+    /// Blocks built for one thread because their parent was.
     pub bypassed_parent: u64,
     /// Bytes of all blocks built, wherever they went.
     pub bytes_built: u64,
@@ -69,7 +71,7 @@ impl CacheStatistics {
         if self.lookups == 0 { 1.0 } else { self.hits as f64 / self.lookups as f64 }
     }
 
-    /// Blocks used once for any reason.
+    /// Blocks built for one thread for any reason.
     pub fn bypasses(&self) -> u64 {
         self.bypassed_too_large + self.bypassed_pinned + self.bypassed_parent
     }
@@ -79,6 +81,7 @@ impl AddAssign for CacheStatistics {
     fn add_assign(&mut self, other: Self) {
         self.lookups += other.lookups;
         self.hits += other.hits;
+        self.private_hits += other.private_hits;
         self.compulsory_misses += other.compulsory_misses;
         self.capacity_misses += other.capacity_misses;
         self.concurrent_misses += other.concurrent_misses;
@@ -110,6 +113,7 @@ impl Sum for CacheStatistics {
 #[derive(Default)]
 pub(super) struct Counters {
     pub hits: Cell<u64>,
+    pub private_hits: Cell<u64>,
     pub compulsory_misses: Cell<u64>,
     pub capacity_misses: Cell<u64>,
     pub concurrent_misses: Cell<u64>,
@@ -163,6 +167,7 @@ impl Counters {
         let mut statistics = CacheStatistics {
             lookups: 0,
             hits: self.hits.get(),
+            private_hits: self.private_hits.get(),
             compulsory_misses: self.compulsory_misses.get(),
             capacity_misses: self.capacity_misses.get(),
             concurrent_misses: self.concurrent_misses.get(),
@@ -179,7 +184,7 @@ impl Counters {
             segments_recycled: 0,
             peak_bytes: 0,
         };
-        statistics.lookups = statistics.hits + statistics.misses();
+        statistics.lookups = statistics.hits + statistics.private_hits + statistics.misses();
         statistics
     }
 }

@@ -69,7 +69,7 @@ fn blocks_of_a_visit_last_until_it_ends() {
 }
 
 #[test]
-fn a_cache_of_nothing_builds_every_time() {
+fn a_cache_of_nothing_leaves_each_thread_what_it_has_just_built() {
     for capacity in [0, 1, 64, 127] {
         let cache = cache(capacity, 4);
         let table = cache.table(1);
@@ -80,10 +80,26 @@ fn a_cache_of_nothing_builds_every_time() {
             let child = fetch(&visit, parent.child(8), 6, bytes(70));
             assert_eq!((parent.bytes()[9], child.bytes()[69], child.bytes().len()), (5, 6, 128));
         }
-        let statistics = pin.statistics();
-        assert_eq!((statistics.hits, statistics.compulsory_misses, statistics.capacity_misses), (0, 1, 2));
-        assert_eq!((statistics.bypassed_too_large, statistics.bypassed_parent, statistics.lookups), (3, 3, 6));
+        let seen = pin.statistics();
+        assert_eq!((seen.hits, seen.private_hits, seen.compulsory_misses, seen.capacity_misses), (0, 4, 1, 0));
+        assert_eq!((seen.bypassed_too_large, seen.bypassed_parent, seen.lookups), (1, 1, 6));
     }
+}
+
+#[test]
+fn a_thread_forgets_its_own_blocks_before_they_are_many() {
+    let cache = cache(0, 4);
+    let table = cache.table(1000);
+    let mut pin = cache.pin();
+    for _ in 0..2 {
+        for id in 0..1000 {
+            let visit = pin.visit();
+            let block = fetch(&visit, visit.root(&table, SlotId(id)), id as u8, bytes(1024));
+            assert!(block.bytes().iter().all(|&b| b == id as u8));
+        }
+    }
+    let seen = pin.statistics();
+    assert_eq!((seen.private_hits, seen.compulsory_misses, seen.capacity_misses), (0, 1000, 1000));
 }
 
 #[test]

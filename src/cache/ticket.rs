@@ -11,7 +11,7 @@ use super::word::{BUILDING, EMPTY, EVICTED, PRIVATE, REBUILDING, without_builder
 
 /// What to do about a slot whose block was missing.
 pub enum Claim<'v> {
-    /// Another thread has just published it.
+    /// Another thread has just published it, or this one has built it for itself before.
     Ready(Block<'v>),
     /// Build it.
     Build(Ticket<'v>),
@@ -21,6 +21,8 @@ pub enum Claim<'v> {
 pub struct Ticket<'v> {
     visit: &'v Visit<'v>,
     word: &'v AtomicU64,
+    /// The slot's.
+    key: usize,
     role: Role,
     watch: Option<Stopwatch>,
 }
@@ -32,7 +34,7 @@ enum Role {
     First(u64),
     /// For all if this thread is faster than the one that claimed the slot, whose state was this.
     Second(u64),
-    /// For this visit.
+    /// For this thread.
     Private,
 }
 
@@ -45,13 +47,17 @@ impl<'p> Visit<'p> {
     #[cold]
     pub fn claim<'v>(&'v self, slot: Slot<'v>) -> Claim<'v> {
         let word = slot.word_in(self.tag());
+        if let Some((bytes, word_lines)) = self.pin.scratch.recall(slot.key()) {
+            count(&self.pin.counters.private_hits);
+            return Claim::Ready(self.private_block_of(bytes, word_lines));
+        }
         let mut seen = word.load(Ordering::Acquire);
         if is_free(seen) && !self.can_read(seen) && !self.is_outsider() {
             let claimed = if seen == EMPTY { BUILDING } else { REBUILDING };
             match word.compare_exchange(seen, claimed, Ordering::Relaxed, Ordering::Acquire) {
                 Ok(_) => {
                     count(self.miss_counter(seen));
-                    return Claim::Build(self.ticket(word, Role::First(claimed)));
+                    return Claim::Build(self.ticket(slot, Role::First(claimed)));
                 }
                 Err(now) => seen = now,
             }
@@ -63,12 +69,12 @@ impl<'p> Visit<'p> {
         }
         count(self.miss_counter(seen));
         let private = seen == PRIVATE || self.is_outsider();
-        Claim::Build(self.ticket(word, if private { Role::Private } else { Role::Second(seen) }))
+        Claim::Build(self.ticket(slot, if private { Role::Private } else { Role::Second(seen) }))
     }
 
-    fn ticket<'v>(&'v self, word: &'v AtomicU64, role: Role) -> Ticket<'v> {
+    fn ticket<'v>(&'v self, slot: Slot<'v>, role: Role) -> Ticket<'v> {
         let watch = self.pin.counters.start_build(matches!(role, Role::Second(_)));
-        Ticket { visit: self, word, role, watch: Some(watch) }
+        Ticket { visit: self, word: slot.word_in(self.tag()), key: slot.key(), role, watch: Some(watch) }
     }
 
     /// The cause of a miss that saw this word.
@@ -83,12 +89,20 @@ impl<'p> Visit<'p> {
     }
 
     /// A block in the pin's own memory. Its children will be private, too.
-    fn private_block<'v>(&'v self, layout: BlockLayout, encode: impl FnOnce(&mut [u8])) -> Block<'v> {
+    fn private_block<'v>(&'v self, key: usize, layout: BlockLayout, encode: impl FnOnce(&mut [u8])) -> Block<'v> {
         let bytes = self.pin.scratch.bytes(layout.bytes);
         let (content, padding) = bytes.split_at_mut(layout.bytes);
         encode(content);
         padding.fill(0);
-        let words = &self.pin.cache.private_words[..layout.word_lines() * super::word::WORDS_PER_LINE];
+        // A child slot in the ring gives its key to another slot when its segment is recycled.
+        if !self.ring().holds(key) {
+            self.pin.scratch.remember(key, bytes, layout.word_lines());
+        }
+        self.private_block_of(bytes, layout.word_lines())
+    }
+
+    fn private_block_of<'v>(&'v self, bytes: &'v [u8], word_lines: usize) -> Block<'v> {
+        let words = &self.pin.cache.private_words[..word_lines * super::word::WORDS_PER_LINE];
         Block {
             bytes,
             words,
@@ -117,7 +131,7 @@ impl<'v> Ticket<'v> {
             Role::Private => {
                 count(&self.counters().bypassed_parent);
                 self.end_build(false);
-                self.visit.private_block(layout, encode)
+                self.visit.private_block(self.key, layout, encode)
             }
         };
         self.role = Role::Private;
@@ -172,14 +186,14 @@ impl<'v> Ticket<'v> {
         Some(unsafe { self.visit.block(seen) })
     }
 
-    /// Builds a block that finds no place in the cache for this visit alone.
+    /// Builds a block that finds no place in the cache for this thread alone.
     fn bypass(&mut self, why: NoPlace, layout: BlockLayout, encode: impl FnOnce(&mut [u8])) -> Block<'v> {
         count(match why {
             NoPlace::TooLarge => &self.counters().bypassed_too_large,
             NoPlace::Pinned => &self.counters().bypassed_pinned,
         });
         self.visit.pin.met_a_pin.set(why == NoPlace::Pinned || self.visit.pin.met_a_pin.get());
-        let block = self.visit.private_block(layout, encode);
+        let block = self.visit.private_block(self.key, layout, encode);
         self.end_build(false);
         self.give_back(|_| EVICTED);
         block

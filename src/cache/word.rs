@@ -34,13 +34,13 @@ pub(super) const WORD_LINES_MASK: u64 = MAX_WORD_LINES as u64;
 
 /// Nobody has built this block yet.
 pub(super) const EMPTY: u64 = 0;
-/// This block was built before and is gone, or was used once.
+/// This block was built before and is gone, or is one thread's own.
 pub(super) const EVICTED: u64 = 1;
 /// A thread is building this block for the first time.
 pub(super) const BUILDING: u64 = 2;
 /// A thread is building this block again.
 pub(super) const REBUILDING: u64 = 3;
-/// A child of a block that is used once: it is built for the visit and never published.
+/// A child of a thread's own block: it is built for that thread and never published.
 pub(super) const PRIVATE: u64 = 4;
 
 /// The state of a slot whose builder gave up, or whose block is copied while a thread builds it elsewhere.

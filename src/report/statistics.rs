@@ -124,6 +124,8 @@ pub struct CacheReport {
     pub lookups: u64,
     /// Blocks that were there.
     pub hits: u64,
+    /// Blocks that were not, but that the same thread had built for itself a little before.
+    pub private_hits: u64,
     /// Hits per lookup, 0 to 1.
     pub hit_rate: f64,
     /// Misses of blocks that nobody had built before.
@@ -132,7 +134,7 @@ pub struct CacheReport {
     pub capacity_misses: u64,
     /// Misses while another thread built the block, or below a block that could not be kept.
     pub other_misses: u64,
-    /// Blocks built and used once, because they could not be kept.
+    /// Blocks built for one thread, because they could not be kept.
     pub bypasses: u64,
     /// Those of them that found no place because a thread was still reading the oldest segment.
     pub bypasses_pinned: u64,
@@ -159,6 +161,7 @@ impl CacheReport {
             capacity_bytes,
             lookups: counters.lookups,
             hits: counters.hits,
+            private_hits: counters.private_hits,
             hit_rate: counters.hit_rate(),
             compulsory_misses: counters.compulsory_misses,
             capacity_misses: counters.capacity_misses,

@@ -99,7 +99,7 @@ impl Builder<'_> {
         let (slot, cells) = node.child(lane);
         let block = match visit.get(slot) {
             Some(block) => block,
-            None => self.build(visit, slot, of, cells),
+            None => self.build(visit, slot, of, Some(cells)),
         };
         if let Some(recorder) = &mut self.recorder {
             recorder.child(level, lane, &block);
@@ -107,9 +107,16 @@ impl Builder<'_> {
         block
     }
 
+    /// Builds the block over these cells, or over the whole patch.
     #[cold]
     #[inline(never)]
-    fn build<'v>(&mut self, visit: &'v Visit<'_>, slot: Slot<'v>, of: PatchContext<'_>, cells: CellRect) -> Block<'v> {
+    fn build<'v>(
+        &mut self,
+        visit: &'v Visit<'_>,
+        slot: Slot<'v>,
+        of: PatchContext<'_>,
+        cells: Option<CellRect>,
+    ) -> Block<'v> {
         let ticket = match visit.claim(slot) {
             Claim::Ready(block) => return block,
             Claim::Build(ticket) => ticket,
@@ -117,6 +124,7 @@ impl Builder<'_> {
         self.n_built += 1;
         self.costs.add(of.id, of.patch, 1);
         let rates = of.mesh.patch_rates(of.patch);
+        let cells = cells.unwrap_or(CellRect { i0: 0, j0: 0, i1: rates.n_u as u16, j1: rates.n_v as u16 });
         let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
         if cells.size().iter().all(|&n| n <= MAX_CELLS) {
             self.dicer.dice(of.mesh.surface(), of.patch, &rates, i, j, &mut self.vertices);
@@ -170,9 +178,7 @@ impl Builder<'_> {
             Some(block) => block,
             None => {
                 cache.touch(of.id, leaf_slot);
-                let rates = of.mesh.patch_rates(of.patch);
-                let cells = CellRect { i0: 0, j0: 0, i1: rates.n_u as u16, j1: rates.n_v as u16 };
-                self.build(visit, slot, of, cells)
+                self.build(visit, slot, of, None)
             }
         };
         if let Some(recorder) = &mut self.recorder {
