@@ -117,7 +117,7 @@ fn every_block_holds_its_own_id_and_no_thread_is_stuck() {
     ] {
         let (slowest, statistics) = stress(n_threads, bytes, reinsert);
         assert!(slowest > 0 && statistics.hits > 0 && statistics.peak_bytes <= bytes as u64);
-        assert_eq!(statistics.lookups, statistics.hits + statistics.misses());
+        assert_eq!(statistics.lookups, statistics.hits + statistics.private_hits + statistics.misses());
         assert_eq!(statistics.misses(), statistics.builds_kept + statistics.builds_discarded + statistics.bypasses());
     }
 }

@@ -198,7 +198,7 @@ fn statistics_add_up() {
         let n = |path: &str| s.pointer(path).and_then(|v| v.as_u64()).unwrap_or_else(|| panic!("{path} in {s}"));
         assert_eq!(s["cache"]["capacity_bytes"], capacity);
         let misses = n("/cache/compulsory_misses") + n("/cache/capacity_misses") + n("/cache/other_misses");
-        assert_eq!(n("/cache/lookups"), n("/cache/hits") + misses);
+        assert_eq!(n("/cache/lookups"), n("/cache/hits") + n("/cache/private_hits") + misses);
         assert_eq!((n("/picture/pixels"), n("/picture/pixels_done"), n("/rays/primary")), (3888, 3888, 7776));
         assert_eq!((n("/geometry/meshes"), n("/geometry/control_faces"), n("/threads")), (3, 60, 2));
         assert!(n("/geometry/patches_touched") > 0 && n("/geometry/patches_touched") <= n("/geometry/patches"));
