@@ -5,9 +5,9 @@ mod common;
 use common::traced::{Traced, camera, placements};
 use glam::{DAffine3, DVec3, Vec3};
 use lazytess::check::{Incidence, LeakSettings, compare_seams, find_leaks};
-use lazytess::ids::FaceId;
+use lazytess::ids::{FaceId, VertexId};
 use lazytess::math::{Intersect, Ray};
-use lazytess::mesh::{ControlMesh, shapes};
+use lazytess::mesh::{ControlMesh, Crease, shapes};
 use lazytess::render::RenderSettings;
 use lazytess::scene::description::Light;
 use lazytess::scene::rate::DicingRate;
@@ -65,6 +65,25 @@ fn a_thousand_faces_at_a_vertex_and_a_thousand_sides_of_a_face() {
     let disc = Traced::new(&shapes::n_gon(1000), DAffine3::IDENTITY, DicingRate::Fixed(2));
     let hit = disc.tracer().closest(&Ray::new(DVec3::new(0.1, 5.0, 0.2), DVec3::NEG_Y));
     assert!(hit.is_some_and(|hit| (hit.t - 5.0).abs() < 1e-4));
+}
+
+/// A polygon's patches all need the whole polygon: taken apart anew for each of them, n sides cost n times n times n.
+#[test]
+fn a_patch_of_a_polygon_costs_no_more_than_its_sides() {
+    let seconds_a_patch = |n: u32| {
+        let surface = Surface::new(&shapes::n_gon(n), 1).unwrap();
+        let mut dicer = Dicer::default();
+        let mut run = || {
+            let start = std::time::Instant::now();
+            for sub in 0..n {
+                dicer.sample(&surface, surface.patch_of(FaceId(0), sub), 0.3, 0.4);
+            }
+            start.elapsed().as_secs_f64() / f64::from(n)
+        };
+        (0..5).map(|_| run()).fold(f64::INFINITY, f64::min)
+    };
+    let [few, many] = [125, 1000].map(seconds_a_patch);
+    assert!(many < 20.0 * few, "eight times the sides, {} times the time of a patch", many / few);
 }
 
 /// Rates that are no powers of two, one cell a patch, a piece less one cell, and the largest.
@@ -170,6 +189,35 @@ fn axis_parallel_rays_with_zeros_of_both_signs_agree() {
     // In the plane of the sheet there is nothing to cross; the answer is free, but it has to come.
     tracer.closest(&Ray::new(DVec3::new(-5.0, 0.0, 0.0), DVec3::X));
     assert!(tracer.closest(&Ray::new(DVec3::new(-5.0, 1e-6, 0.0), DVec3::X)).is_none());
+}
+
+/// A ray along an edge lies in the planes of both faces beside it: whether it touches them is free, but it must not pass the
+/// face that it meets head-on, nor lose its way among determinants that are all zero.
+#[test]
+fn rays_along_edges_and_grid_lines_find_what_lies_across() {
+    let half = shapes::cube().bounds().max.x;
+    let mut mesh = shapes::crease_cube(f32::INFINITY);
+    mesh.creases = all_edges(&mesh).map(|edge| Crease { edge, sharpness: f32::INFINITY }).collect();
+    for place in placements() {
+        let cube = Traced::new(&mesh, place, DicingRate::Fixed(8));
+        let mut tracer = cube.tracer();
+        for [x, y] in [[1.0, 1.0], [1.0, 0.25], [0.5, -1.0], [0.25, 0.5], [0.0, 0.0]] {
+            let origin = half * DVec3::new(x, y, 3.0);
+            let ray = Ray::new(place.transform_point3(origin), place.transform_vector3(half * DVec3::NEG_Z));
+            let hit = tracer.closest(&ray);
+            assert_eq!(hit.is_some(), tracer.occluded(&ray), "{x}, {y}, {place:?}");
+            let is_inside = f64::max(x.abs(), y.abs()) < 1.0;
+            assert!(hit.is_some() || !is_inside, "{x}, {y}, {place:?}");
+            // Two half widths to the front; a ray along a border may touch anything up to the back.
+            let last = if is_inside { 2.0 } else { 4.0 };
+            let is_there = |t: f32| (2.0 - 1e-5..=last + 1e-5).contains(&f64::from(t));
+            assert!(hit.is_none_or(|hit| is_there(hit.t)), "{x}, {y}, {place:?}: {hit:?}");
+        }
+    }
+}
+
+fn all_edges(mesh: &ControlMesh) -> impl Iterator<Item = [VertexId; 2]> {
+    mesh.faces().flat_map(|face| (0..face.len()).map(|k| [face[k], face[(k + 1) % face.len()]]))
 }
 
 /// Lengths whose squares overflow or vanish in single precision.
