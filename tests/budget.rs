@@ -66,3 +66,22 @@ fn too_small_a_budget_is_refused_with_one_that_does() {
     assert!(refused("1M").contains("of the file fill it; all of it takes"));
     assert!(!folder.path().join("none.exr").exists());
 }
+
+/// Bytes of address space that are mapped and hardly ever resident: program and libraries, stacks of threads.
+#[cfg(target_os = "linux")]
+const MAPPED_ONLY: u64 = 40 << 20;
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_render_gets_by_under_a_hard_limit_of_its_budget() {
+    let folder = folder_with_ground("10k");
+    for megabytes in [32u64, 48, 96] {
+        let limit = ((megabytes << 20) * 105 / 100 + MAPPED_ONLY) >> 10;
+        let render = RENDER.join(" ");
+        let program = env!("CARGO_BIN_EXE_lazytess");
+        let line = format!("ulimit -v {limit}; exec {program} {render} --memory {megabytes}M");
+        // Arenas for threads would map 64 MiB each in advance.
+        let mut shell = Command::new("sh");
+        shell.env("MALLOC_ARENA_MAX", "1").current_dir(folder.path()).args(["-c", &line]).assert().success();
+    }
+}

@@ -130,6 +130,11 @@ impl<'c> Pin<'c> {
         }
     }
 
+    /// Bytes of the blocks that this pin's thread has built.
+    pub fn bytes_built(&self) -> u64 {
+        self.counters.bytes_built.get()
+    }
+
     /// What this pin has counted so far.
     pub fn statistics(&self) -> CacheStatistics {
         self.counters.statistics()

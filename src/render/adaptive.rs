@@ -29,7 +29,7 @@ use super::reason::{PixelCounts, Reason};
 use super::sampler::subpixel;
 use super::settings::{Appearance, RenderSettings, RunSettings};
 use super::tiles::PixelRect;
-use super::tracer::Tracer;
+use super::tracer::{Built, Tracer};
 use super::workers::{GroupSeconds, PixelTracer, Rendered, TileQueue, in_threads, render};
 use crate::ids::{MeshId, PatchId};
 use crate::image::display::display_value;
@@ -201,7 +201,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
             let (ray, sampler) = interpolation.pixels().sample(pixel, 0);
             self.shader.probe(interpolation.camera, ray, sampler)
         };
-        self.tile.set_probe(pixel, TracedProbe { probe, misses: (self.shader.misses() - before) as u32 });
+        self.tile.set_probe(pixel, TracedProbe { probe, misses: self.shader.misses() - before });
     }
 
     /// The pixel, unless it is to be interpolated: then a mere note of that.
@@ -368,7 +368,7 @@ impl<'a> Interpolation<'a> {
             color: (sum / n as f32).to_array(),
             samples: 0,
             first: corners.first_hit(place_in(DVec2::from(pixel.map(f64::from)) + 0.5)),
-            misses: 0,
+            misses: Built::default(),
             group: self.group(&place),
             reason: Reason::Interpolated,
             error,

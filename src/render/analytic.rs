@@ -1,6 +1,6 @@
 //! A tracer for tests whose answers are known in closed form: spheres and one-sided floors, each a mesh of one patch.
 
-use super::tracer::{SurfacePoint, Tracer};
+use super::tracer::{Built, SurfacePoint, Tracer};
 use crate::ids::{FaceId, MeshId, PatchId};
 use crate::math::{Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
 use glam::DVec3;
@@ -77,7 +77,7 @@ impl Tracer for AnalyticTracer {
         64
     }
 
-    fn misses(&self) -> u64 {
-        0
+    fn misses(&self) -> Built {
+        Built::default()
     }
 }

@@ -7,6 +7,7 @@
 use super::integrators::Probe;
 use super::reason::Reason;
 use super::tiles::PixelRect;
+use super::tracer::Built;
 
 /// Side of a tile in pixels. Smaller tiles share fewer probes, larger ones keep threads waiting at the end.
 pub(super) const TILE_SIDE: u32 = 64;
@@ -35,7 +36,7 @@ pub(super) enum Cell {
 pub(super) struct TracedProbe {
     pub probe: Probe,
     /// Blocks built for it.
-    pub misses: u32,
+    pub misses: Built,
 }
 
 /// A tile at work.

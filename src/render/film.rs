@@ -3,6 +3,7 @@
 use super::groups::NO_GROUP;
 use super::reason::Reason;
 use super::tiles::PixelRect;
+use super::tracer::Built;
 use std::str::FromStr;
 
 /// What a film can store besides colour. Geometry is that of sample 0, at the pixel's centre.
@@ -22,6 +23,8 @@ pub enum Aov {
     Samples,
     /// Number of blocks built while the pixel was rendered. Unlike everything else it depends on timing.
     Misses,
+    /// Bytes of those blocks: what it cost to build them, about. Depends on timing as well.
+    Build,
     /// Number of the pixel's group; [`NO_GROUP`] where there is none.
     Group,
     /// Number of the pixel's [`Reason`].
@@ -32,7 +35,7 @@ pub enum Aov {
 
 impl Aov {
     /// Every AOV with its name on the command line.
-    pub const ALL: [(&'static str, Self); 10] = [
+    pub const ALL: [(&'static str, Self); 11] = [
         ("Z", Self::Depth),
         ("N", Self::Normal),
         ("mesh", Self::Mesh),
@@ -40,6 +43,7 @@ impl Aov {
         ("uv", Self::Uv),
         ("samples", Self::Samples),
         ("miss", Self::Misses),
+        ("build", Self::Build),
         ("group", Self::Group),
         ("reason", Self::Reason),
         ("error", Self::Error),
@@ -55,6 +59,7 @@ impl Aov {
             Self::Uv => ("uv", &["u", "v"]),
             Self::Samples => ("", &["samples"]),
             Self::Misses => ("", &["miss"]),
+            Self::Build => ("", &["build"]),
             Self::Group => ("", &["group"]),
             Self::Reason => ("", &["reason"]),
             Self::Error => ("", &["error"]),
@@ -107,8 +112,8 @@ pub struct PixelRecord {
     pub samples: u32,
     /// Geometry of sample 0.
     pub first: FirstHit,
-    /// See [`Aov::Misses`].
-    pub misses: u32,
+    /// See [`Aov::Misses`] and [`Aov::Build`].
+    pub misses: Built,
     /// See [`Aov::Group`].
     pub group: u32,
     /// Why it was traced, or that it was not.
@@ -121,7 +126,15 @@ impl PixelRecord {
     /// A pixel that shows the background and for which nothing was traced.
     pub fn background(color: [f32; 3]) -> Self {
         let first = FirstHit::NONE;
-        Self { color, samples: 0, first, misses: 0, group: NO_GROUP, reason: Reason::Background, error: 0.0 }
+        Self {
+            color,
+            samples: 0,
+            first,
+            misses: Built::default(),
+            group: NO_GROUP,
+            reason: Reason::Background,
+            error: 0.0,
+        }
     }
 }
 
@@ -141,7 +154,7 @@ impl PlaneData {
             Aov::Normal | Aov::Uv => Self::Float(vec![vec![0.0; n_pixels]; aov.channels().1.len()]),
             Aov::Error => Self::Float(vec![vec![0.0; n_pixels]]),
             Aov::Mesh | Aov::Patch | Aov::Group => Self::Id(vec![FirstHit::NO_ID; n_pixels]),
-            Aov::Samples | Aov::Misses | Aov::Reason => Self::Id(vec![0; n_pixels]),
+            Aov::Samples | Aov::Misses | Aov::Build | Aov::Reason => Self::Id(vec![0; n_pixels]),
         }
     }
 
@@ -155,7 +168,8 @@ impl PlaneData {
                     Aov::Samples => record.samples,
                     Aov::Group => record.group,
                     Aov::Reason => record.reason as u32,
-                    _ => record.misses,
+                    Aov::Build => saturated(record.misses.bytes),
+                    _ => saturated(record.misses.blocks),
                 }
             }
             Self::Float(channels) => {
@@ -169,6 +183,10 @@ impl PlaneData {
             }
         }
     }
+}
+
+fn saturated(n: u64) -> u32 {
+    n.min(u64::from(u32::MAX)) as u32
 }
 
 /// Colours and AOVs of a window of the picture. Pixels that are not done are black and say so.

@@ -140,7 +140,7 @@ impl<T: Tracer> Tracer for Witness<'_, T> {
         self.tracer.patch_rate(primitive)
     }
 
-    fn misses(&self) -> u64 {
+    fn misses(&self) -> Built {
         self.tracer.misses()
     }
 }

@@ -10,7 +10,7 @@
 //! from its edges is on the right side of every neighbour, those of a concave crease included unless it is sharper than
 //! 14 degrees.
 
-use super::tracer::{SurfacePoint, Tracer};
+use super::tracer::{Built, SurfacePoint, Tracer};
 use crate::math::{Hit, OnTriangle, PrimitiveRef, Ray};
 use crate::scene::intersect::Intersector;
 use crate::scene::world::WorldMesh;
@@ -50,8 +50,8 @@ impl Tracer for Intersector<'_> {
         rates.n_u.max(rates.n_v)
     }
 
-    fn misses(&self) -> u64 {
-        self.n_built()
+    fn misses(&self) -> Built {
+        Built { blocks: self.n_built(), bytes: self.bytes_built() }
     }
 }
 

@@ -51,5 +51,5 @@ pub use rays::{RayCounts, RayKind};
 pub use reason::{PixelCounts, Reason};
 pub use settings::{Appearance, Groups, Progress, RenderSettings, RunSettings};
 pub use tiles::{PixelRect, TileOrder};
-pub use tracer::{SurfacePoint, Tracer};
+pub use tracer::{Built, SurfacePoint, Tracer};
 pub use workers::{Rendered, render};

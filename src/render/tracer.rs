@@ -27,6 +27,31 @@ pub trait Tracer: Intersect {
     /// Largest rate of the four edges of the patch that `primitive` is part of.
     fn patch_rate(&self, primitive: &PrimitiveRef) -> u32;
 
-    /// How many blocks (grid pieces and tree nodes) this tracer has had to build so far.
-    fn misses(&self) -> u64;
+    /// What this tracer has had to build so far.
+    fn misses(&self) -> Built;
+}
+
+/// Blocks (grid pieces and tree nodes) that were missing and had to be built.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Built {
+    /// How many.
+    pub blocks: u64,
+    /// Bytes of them.
+    pub bytes: u64,
+}
+
+impl std::ops::Add for Built {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { blocks: self.blocks + other.blocks, bytes: self.bytes + other.bytes }
+    }
+}
+
+impl std::ops::Sub for Built {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self { blocks: self.blocks - other.blocks, bytes: self.bytes - other.bytes }
+    }
 }

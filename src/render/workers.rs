@@ -8,7 +8,7 @@ use super::reason::{PixelCounts, Reason};
 use super::sampler::{Sampler, subpixel};
 use super::settings::{Appearance, Progress, RenderSettings, RunSettings};
 use super::tiles::{PixelRect, TileOrder};
-use super::tracer::Tracer;
+use super::tracer::{Built, Tracer};
 use crate::math::Ray;
 use crate::scene::camera::Camera;
 use glam::{DVec2, DVec3};
@@ -136,7 +136,7 @@ impl PixelTracer<'_> {
         &self,
         shader: &mut Shader<'_, T>,
         pixel: [u32; 2],
-        known: Option<(Sample, u32)>,
+        known: Option<(Sample, Built)>,
     ) -> PixelRecord {
         let _witness = PanicWitness(pixel);
         let misses_before = shader.misses();
@@ -152,7 +152,7 @@ impl PixelTracer<'_> {
             color: (sum / f64::from(self.settings.spp)).as_vec3().to_array(),
             samples: self.settings.spp,
             first: first.expect("a pixel has at least one sample"),
-            misses: (shader.misses() - misses_before) as u32 + known.map_or(0, |(_, misses)| misses),
+            misses: shader.misses() - misses_before + known.map_or(Built::default(), |(_, misses)| misses),
             group: NO_GROUP,
             reason: Reason::Every,
             error: 0.0,

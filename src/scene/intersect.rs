@@ -395,6 +395,11 @@ impl<'w> Intersector<'w> {
         self.builder.n_built
     }
 
+    /// Bytes of them.
+    pub fn bytes_built(&self) -> u64 {
+        self.pin.bytes_built()
+    }
+
     /// The limit surface's normal at a hit, in object space, along du x dv and not normalised; zero where there is none.
     pub fn limit_normal(&mut self, hit: &Hit) -> DVec3 {
         let surface = self.world.mesh(hit.primitive.mesh).surface();

@@ -4,7 +4,7 @@ use super::Shader;
 use super::interaction::Interaction;
 use crate::image::color_map::viridis;
 use crate::render::sampler::{hash2, pcg};
-use crate::render::tracer::Tracer;
+use crate::render::tracer::{Built, Tracer};
 use crate::scene::camera::Camera;
 use crate::scene::description::DebugView;
 use crate::scene::rate::MAX_RATE;
@@ -17,7 +17,7 @@ impl<'a, T: Tracer> Shader<'a, T> {
         view: DebugView,
         x: &Interaction<'a>,
         camera: &Camera,
-        misses_before: u64,
+        misses_before: Built,
     ) -> Vec3 {
         match view {
             DebugView::Normal => 0.5 * (x.point.shading_normal.as_vec3() + Vec3::ONE),
@@ -26,7 +26,7 @@ impl<'a, T: Tracer> Shader<'a, T> {
             DebugView::Rate => logarithmic(self.tracer.patch_rate(&x.hit.primitive) as f32, MAX_RATE as f32),
             DebugView::Depth => depth_color(x, camera),
             // 255 misses for one ray is far beyond what the depth of the trees allows.
-            DebugView::Miss => logarithmic((self.misses() - misses_before) as f32 + 1.0, 256.0),
+            DebugView::Miss => logarithmic((self.misses() - misses_before).blocks as f32 + 1.0, 256.0),
         }
     }
 }

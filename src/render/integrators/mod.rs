@@ -24,7 +24,7 @@ use super::film::FirstHit;
 use super::rays::{RayCounts, RayKind};
 use super::sampler::Sampler;
 use super::settings::{Appearance, RenderSettings};
-use super::tracer::Tracer;
+use super::tracer::{Built, Tracer};
 use crate::math::Ray;
 use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
@@ -65,7 +65,7 @@ impl<'a, T: Tracer> Shader<'a, T> {
     }
 
     /// Blocks that the tracer has built so far.
-    pub fn misses(&self) -> u64 {
+    pub fn misses(&self) -> Built {
         self.tracer.misses()
     }
 
