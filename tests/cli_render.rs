@@ -174,6 +174,22 @@ fn layers_tell_what_is_seen() {
 }
 
 #[test]
+fn what_was_built_for_all_pixels_is_what_the_cache_has_built() {
+    let folder = folder();
+    render(folder.path(), "scene.toml -o out.exr --aov miss,build --cache 8K --threads 2 --stats s.json").success();
+    let (image, s) = (read_all_flat_layers_from_file(folder.path().join("out.exr")).unwrap(), stats(folder.path()));
+    let sum = |name: &str| {
+        let list = &image.layer_data[0].channel_data.list;
+        let channel = list.iter().find(|channel| channel.name.to_string() == name).unwrap();
+        channel.sample_data.values_as_f32().map(f64::from).sum::<f64>()
+    };
+    let number = |path: &str| s.pointer(path).and_then(|v| v.as_f64()).unwrap();
+    let misses = ["compulsory", "capacity", "other"].map(|cause| number(&format!("/cache/{cause}_misses")));
+    assert_eq!(sum("miss"), misses.iter().sum::<f64>());
+    assert_eq!(sum("build"), number("/cache/bytes_built"));
+}
+
+#[test]
 fn png_is_the_exr_s_colours_in_srgb() {
     let folder = folder();
     render(folder.path(), "scene.toml -o out.exr --quiet").success();
