@@ -1,8 +1,8 @@
 //! Rows of sparse matrices, packed: what a plan library mostly consists of.
 //!
-//! Few rows differ in their **weights** (a mesh with hundreds of nodes has a few hundred lists of weights), so that each
-//! distinct list, a **mask**, is kept once, in f64. A row is a mask and its columns, two bytes each as long as no ring has
-//! more than 65,536 points.
+//! Few rows differ in their **weights**, so that each distinct list, a **mask**, is kept once, in f64. Terms are in the order
+//! of their weights: then rows that differ in the order of their columns have one mask. A row is a mask and a list of
+//! columns, two bytes each as long as no ring has more than 65,536 points; equal lists are kept once, too.
 
 use super::rules::Row;
 use rustc_hash::FxHashMap;
@@ -78,6 +78,8 @@ pub struct RowStore {
     indices: Indices,
     /// Masks by the bits of their weights, while rows are added.
     known: FxHashMap<Vec<u64>, u32>,
+    /// Where lists of indices start, while they are added.
+    known_lists: FxHashMap<Vec<u32>, u32>,
 }
 
 impl Default for RowStore {
@@ -88,6 +90,7 @@ impl Default for RowStore {
             weights: Vec::new(),
             indices: Indices::Narrow(Vec::new()),
             known: FxHashMap::default(),
+            known_lists: FxHashMap::default(),
         }
     }
 }
@@ -197,23 +200,33 @@ pub(super) enum Width<'s> {
 }
 
 impl RowStore {
-    /// Adds rows, columns and weights as they are.
+    /// Adds rows.
     pub fn push<'a>(&mut self, rows: impl IntoIterator<Item = &'a Row>) -> SparseRows {
         let first = self.rows.len() as u32;
         for row in rows {
-            let columns = self.indices.len() as u32;
-            row.iter().for_each(|&(column, _)| self.indices.push(column));
-            let mask = self.mask(row);
-            self.rows.push(PackedRow { columns, mask });
+            let mut row = row.clone();
+            row.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+            let columns: Vec<u32> = row.iter().map(|&(column, _)| column).collect();
+            let packed = PackedRow { columns: self.list_start(columns), mask: self.mask(&row) };
+            self.rows.push(packed);
         }
         SparseRows { first, len: self.rows.len() as u32 - first }
     }
 
     /// Adds a list of indices.
     pub fn push_indices(&mut self, indices: &[u32]) -> Span {
-        let first = self.indices.len() as u32;
-        indices.iter().for_each(|&i| self.indices.push(i));
-        Span { first, len: indices.len() as u32 }
+        Span { first: self.list_start(indices.to_vec()), len: indices.len() as u32 }
+    }
+
+    /// Where a list starts, added if it is new.
+    fn list_start(&mut self, list: Vec<u32>) -> u32 {
+        if let Some(&start) = self.known_lists.get(&list) {
+            return start;
+        }
+        let start = self.indices.len() as u32;
+        list.iter().for_each(|&i| self.indices.push(i));
+        self.known_lists.insert(list, start);
+        start
     }
 
     fn mask(&mut self, row: &Row) -> u32 {
@@ -274,7 +287,7 @@ impl RowStore {
 
     /// Drops what only adding needs.
     pub fn seal(&mut self) {
-        self.known = FxHashMap::default();
+        (self.known, self.known_lists) = Default::default();
         self.rows.shrink_to_fit();
         self.masks.shrink_to_fit();
         self.weights.shrink_to_fit();
@@ -287,7 +300,9 @@ impl RowStore {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let known: usize = self.known.keys().map(|k| 8 * k.len() + 40).sum();
+        let known_lists: usize = self.known_lists.keys().map(|k| 4 * k.len() + 40).sum();
         known
+            + known_lists
             + size_of_val(&self.rows[..])
             + size_of_val(&self.masks[..])
             + size_of_val(&self.weights[..])
@@ -302,9 +317,11 @@ mod tests {
     #[test]
     fn rows_come_back_as_they_went_in_whatever_their_width() {
         let mut store = RowStore::default();
-        let few: Vec<Row> = vec![vec![(3, 0.25), (1, 0.75)], vec![(7, 0.25), (2, 0.75)], vec![]];
+        let few: Vec<Row> = vec![vec![(3, 0.25), (1, 0.75)], vec![(3, 0.25), (2, 0.75)], vec![]];
         let narrow = store.push(&few);
+        store.push([&vec![(1, 0.75), (3, 0.25)]]);
         assert_eq!(store.masks.len(), 2, "equal weights are kept once");
+        assert_eq!(store.indices.len(), 4, "equal lists are kept once");
         let wide = store.push([&vec![(70_000, 1.5)]]);
         let list = store.push_indices(&[5, 100_000]);
         for (i, row) in few.iter().enumerate() {
