@@ -22,7 +22,7 @@
 
 use super::cells::{CELL_SIDES, Cell, CellPlace, TILE_SIDE, Tile, TracedProbe};
 use super::film::{Film, FirstHit, PixelRecord};
-use super::footprint::{Claim, Footprints};
+use super::footprint::{Claim, Footprints, Scenery};
 use super::integrators::{LightMasks, Probe, Sample, Shader, Smooth, SmoothPoint};
 use super::rays::RayCounts;
 use super::reason::{PixelCounts, Reason};
@@ -62,24 +62,21 @@ pub fn render_adaptive<T: Tracer>(
     run: &RunSettings<'_>,
     make_tracer: impl Fn() -> T + Sync,
 ) -> Rendered {
-    let watch = Instant::now();
-    let footprints = Footprints::new(world, camera, settings, run.threads).filter(|_| settings.tolerance > 0.0);
-    let Some(footprints) = footprints else {
+    if settings.tolerance <= 0.0 {
         return render(camera, appearance, settings, run, make_tracer);
-    };
-    let prepare = watch.elapsed().as_secs_f64();
-    let interpolation = Interpolation { camera, appearance, settings };
-    let job = Job { world, footprints: &footprints, interpolation };
+    }
+    let scenery = Scenery::new(world, camera, settings);
+    let job = Interpolation { camera, appearance, settings };
     let film = Mutex::new(Film::new(settings.window, &settings.aovs));
     let queue = TileQueue::new(aligned(settings.window), TILE_SIDE, run);
     let outcomes = in_threads(run.threads, || {
         let mut tracer = make_tracer();
         let shader = Shader::new(&mut tracer, appearance, settings);
-        Worker { job: &job, shader, tile: Tile::new(), outcome: Outcome::default() }.work(&queue, &film)
+        let footprints = Footprints::new(&scenery);
+        Worker { job: &job, footprints, shader, tile: Tile::new(), outcome: Outcome::default() }.work(&queue, &film)
     });
     let mut total = Outcome::default();
     outcomes.into_iter().for_each(|outcome| total.add(outcome));
-    total.seconds.prepare = prepare;
     let film = film.into_inner();
     let complete = film.n_done() == settings.window.n_pixels();
     Rendered { film, rays: total.rays, pixels: total.pixels, seconds: total.seconds, complete }
@@ -90,13 +87,6 @@ fn aligned(window: PixelRect) -> PixelRect {
     let down = |n: u32| n - n % TILE_SIDE;
     let up = |n: u32| n.next_multiple_of(TILE_SIDE);
     PixelRect { x0: down(window.x0), y0: down(window.y0), x1: up(window.x1), y1: up(window.y1) }
-}
-
-/// What all workers share.
-struct Job<'a> {
-    world: &'a World,
-    footprints: &'a Footprints,
-    interpolation: Interpolation<'a>,
 }
 
 /// What one worker has done.
@@ -111,13 +101,15 @@ impl Outcome {
     fn add(&mut self, other: Self) {
         self.rays += other.rays;
         self.pixels += other.pixels;
+        self.seconds.prepare += other.seconds.prepare;
         self.seconds.trace += other.seconds.trace;
         self.seconds.interpolate += other.seconds.interpolate;
     }
 }
 
 struct Worker<'j, 's, T> {
-    job: &'j Job<'j>,
+    job: &'j Interpolation<'j>,
+    footprints: Footprints<'j>,
     shader: Shader<'s, T>,
     tile: Tile,
     outcome: Outcome,
@@ -125,10 +117,13 @@ struct Worker<'j, 's, T> {
 
 impl<T: Tracer> Worker<'_, '_, T> {
     fn work(mut self, queue: &TileQueue<'_>, film: &Mutex<Film>) -> Outcome {
-        let window = self.job.interpolation.settings.window;
+        let window = self.job.settings.window;
         let mut records = Vec::with_capacity(TILE_SIDE.pow(2) as usize);
         while let Some(tile) = queue.next_tile() {
             let visible = intersection(tile, window);
+            let watch = Instant::now();
+            self.footprints.find([tile.x0, tile.y0]);
+            self.outcome.seconds.prepare += watch.elapsed().as_secs_f64();
             self.render(tile, visible, &mut records);
             records.iter().for_each(|record| self.outcome.pixels.add(record.reason, 1));
             film.lock().store(visible, &records);
@@ -141,14 +136,17 @@ impl<T: Tracer> Worker<'_, '_, T> {
     /// Fills `records` with the pixels of `visible`, a part of `tile`.
     fn render(&mut self, tile: PixelRect, visible: PixelRect, records: &mut Vec<PixelRecord>) {
         let watch = Instant::now();
+        records.clear();
+        records.resize(visible.n_pixels(), PixelRecord::background(self.job.appearance.background.to_array()));
+        if self.footprints.is_bare() {
+            return;
+        }
         self.tile.reset([tile.x0, tile.y0]);
-        if self.job.interpolation.is_possible() {
+        if self.job.is_possible() {
             (0..CELL_SIDES.len()).for_each(|level| self.refine(level));
         } else {
             self.split_all();
         }
-        records.clear();
-        records.resize(visible.n_pixels(), PixelRecord::background([0.0; 3]));
         for k in 0..TILE_SIDE.pow(2) {
             let pixel = [tile.x0 + even_bits(k), tile.y0 + even_bits(k >> 1)];
             if let Some(idx) = visible.idx(pixel) {
@@ -158,7 +156,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         let traced = watch.elapsed().as_secs_f64();
         for (record, pixel) in records.iter_mut().zip(visible.pixels()) {
             if record.reason == Reason::Interpolated {
-                *record = self.job.interpolation.pixel(&self.tile, pixel);
+                *record = self.job.pixel(&self.tile, pixel);
             }
         }
         self.outcome.seconds.trace += traced;
@@ -169,7 +167,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
     fn split_all(&mut self) {
         for level in 0..CELL_SIDES.len() {
             for place in self.tile.cells_to_judge(level) {
-                let is_empty = self.job.footprints.is_empty(place.pixels());
+                let is_empty = self.footprints.is_empty(place.pixels());
                 self.tile.set_cell(&place, if is_empty { Cell::Empty } else { Cell::Split(Reason::Every) });
             }
         }
@@ -177,11 +175,11 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     fn refine(&mut self, level: usize) {
         for place in self.tile.cells_to_judge(level) {
-            let cell = if self.job.footprints.is_empty(place.pixels()) {
+            let cell = if self.footprints.is_empty(place.pixels()) {
                 Cell::Empty
             } else {
                 place.probe_pixels().into_iter().for_each(|pixel| self.trace_probe(pixel));
-                self.job.judge(&self.tile, &place)
+                self.judge(&place)
             };
             self.tile.set_cell(&place, cell);
         }
@@ -192,9 +190,9 @@ impl<T: Tracer> Worker<'_, '_, T> {
         if self.tile.probe(pixel).is_some() {
             return;
         }
-        let interpolation = &self.job.interpolation;
+        let interpolation = self.job;
         let before = self.shader.misses();
-        let probe = if self.job.footprints.is_empty(single(pixel)) {
+        let probe = if self.footprints.is_empty(single(pixel)) {
             let sample = Sample { radiance: interpolation.appearance.background, first: FirstHit::NONE };
             Probe { sample, smooth: None }
         } else {
@@ -206,13 +204,13 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// The pixel, unless it is to be interpolated: then a mere note of that.
     fn traced(&mut self, pixel: [u32; 2]) -> PixelRecord {
-        let interpolation = &self.job.interpolation;
+        let interpolation = self.job;
         let background = PixelRecord::background(interpolation.appearance.background.to_array());
         let (place, cell) = self.tile.find(pixel);
         match cell {
             Cell::Undivided | Cell::Empty => background,
             Cell::Holds { .. } => interpolation.probed(&self.tile, &place, pixel).unwrap_or(background.interpolated()),
-            Cell::Split(_) if self.job.footprints.is_empty(single(pixel)) => background,
+            Cell::Split(_) if self.footprints.is_empty(single(pixel)) => background,
             Cell::Split(reason) => {
                 let known = self.tile.probe(pixel).map(|p| (p.probe.sample, p.misses));
                 PixelRecord { reason, ..interpolation.pixels().trace_from(&mut self.shader, pixel, known) }
@@ -240,11 +238,11 @@ fn intersection(a: PixelRect, b: PixelRect) -> PixelRect {
     PixelRect { x0: a.x0.max(b.x0), y0: a.y0.max(b.y0), x1: a.x1.min(b.x1), y1: a.y1.min(b.y1) }
 }
 
-impl Job<'_> {
+impl<T> Worker<'_, '_, T> {
     /// Whether a cell whose probes are traced can be interpolated.
-    fn judge(&self, tile: &Tile, place: &CellPlace) -> Cell {
+    fn judge(&mut self, place: &CellPlace) -> Cell {
         let pixels = place.probe_pixels();
-        let probes = pixels.map(|pixel| tile.probe(pixel).expect("all probes of a judged cell are traced").probe);
+        let probes = pixels.map(|pixel| self.tile.probe(pixel).expect("all probes of a judged cell are traced").probe);
         let Some(smooths) = all_smooth(&probes) else { return Cell::Split(Reason::Silhouette) };
         if let Some(reason) = first_difference(&smooths) {
             return Cell::Split(reason);
@@ -252,18 +250,27 @@ impl Job<'_> {
         if !self.is_connected(place, &probes, &smooths) {
             return Cell::Split(Reason::Hidden);
         }
-        let error = self.interpolation.prediction_error(place, &probes, &smooths);
-        let holds = error <= self.interpolation.settings.tolerance;
+        let error = self.job.prediction_error(place, &probes, &smooths);
+        let holds = error <= self.job.settings.tolerance;
         if holds { Cell::Holds { error } } else { Cell::Split(Reason::Contradiction) }
     }
 
-    fn is_connected<const N: usize>(&self, place: &CellPlace, probes: &[Probe; N], smooths: &[Smooth; N]) -> bool {
-        let number =
-            |p: &Probe| self.footprints.numbers.number(MeshId(p.sample.first.mesh), PatchId(p.sample.first.patch));
-        let hits: [u32; N] = std::array::from_fn(|k| number(&probes[k]));
+    fn is_connected<const N: usize>(
+        &mut self,
+        place: &CellPlace,
+        probes: &[Probe; N],
+        smooths: &[Smooth; N],
+    ) -> bool {
+        let mut hits: Vec<_> = Vec::with_capacity(N);
+        for first in probes.iter().map(|p| p.sample.first) {
+            let hit = (MeshId(first.mesh), PatchId(first.patch));
+            if !hits.contains(&hit) {
+                hits.push(hit);
+            }
+        }
         let farthest = probes.iter().fold(0.0, |far: f32, p| far.max(p.sample.first.depth));
         let claim = Claim { hits: &hits, outside: smooths[0].outside, farthest };
-        self.footprints.agree(self.world, place.pixels(), &claim)
+        self.footprints.agree(place.pixels(), &claim)
     }
 }
 

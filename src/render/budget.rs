@@ -86,7 +86,7 @@ fn group_bytes(settings: &RenderSettings, threads: usize) -> usize {
     match settings.groups {
         Groups::Off => 0,
         Groups::Thesis => super::thesis::max_bytes(settings),
-        Groups::Adaptive => Footprints::max_bytes(settings) + threads * Tile::BYTES,
+        Groups::Adaptive => threads * (Footprints::BYTES + Tile::BYTES),
     }
 }
 

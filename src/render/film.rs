@@ -244,15 +244,26 @@ impl Film {
 
     /// Exposes one pixel of the window.
     pub fn set(&mut self, pixel: [u32; 2], record: &PixelRecord) {
-        let idx = self.window.idx(pixel).expect("the pixel lies in the film's window");
-        self.colors[idx] = record.color;
-        self.done[idx] = true;
-        self.planes.iter_mut().for_each(|(aov, plane)| plane.set(*aov, idx, record));
+        let idx = self.idx(pixel);
+        self.expose(idx, record);
     }
 
     /// Exposes a tile of the window; `records` are its pixels row by row.
     pub fn store(&mut self, tile: PixelRect, records: &[PixelRecord]) {
-        tile.pixels().zip(records).for_each(|(pixel, record)| self.set(pixel, record));
+        for (y, records) in (tile.y0..tile.y1).zip(records.chunks_exact(tile.width() as usize)) {
+            let first = self.idx([tile.x0, y]);
+            records.iter().enumerate().for_each(|(k, record)| self.expose(first + k, record));
+        }
+    }
+
+    fn idx(&self, pixel: [u32; 2]) -> usize {
+        self.window.idx(pixel).expect("the pixel lies in the film's window")
+    }
+
+    fn expose(&mut self, idx: usize, record: &PixelRecord) {
+        self.colors[idx] = record.color;
+        self.done[idx] = true;
+        self.planes.iter_mut().for_each(|(aov, plane)| plane.set(*aov, idx, record));
     }
 }
 

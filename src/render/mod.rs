@@ -28,7 +28,7 @@ mod analytic;
 pub mod budget;
 mod cells;
 pub mod film;
-pub mod footprint;
+mod footprint;
 #[cfg(test)]
 mod group_tests;
 pub mod groups;
@@ -37,6 +37,7 @@ pub mod interpolate;
 pub mod item_buffer;
 mod lazy;
 mod patches;
+mod projection;
 pub mod rays;
 pub mod reason;
 pub mod sampler;

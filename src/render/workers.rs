@@ -30,10 +30,10 @@ pub struct Rendered {
     pub complete: bool,
 }
 
-/// Time spent on groups, summed over threads but for `prepare`.
+/// Time spent on groups, summed over threads.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GroupSeconds {
-    /// Finding out what might be seen where, by the clock.
+    /// Finding out what might be seen where; for `thesis` by the clock.
     pub prepare: f64,
     /// Tracing and shading rays.
     pub trace: f64,

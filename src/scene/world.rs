@@ -262,6 +262,12 @@ impl WorldMesh {
         self.visible.as_ref().map_or(leaf, |ids| ids[leaf.idx()])
     }
 
+    /// Calls `found` for every patch with a surface and a box, in lattice units, that holds it at any rates, but for
+    /// those in larger boxes that `enter` turns down.
+    pub fn visit_patches(&self, enter: impl FnMut(&Bounds) -> bool, mut found: impl FnMut(PatchId, &Bounds)) {
+        self.top.visit(enter, |leaf, bounds| found(self.patch_of_leaf(leaf), bounds));
+    }
+
     /// How finely a patch is diced.
     pub fn patch_rates(&self, patch: PatchId) -> PatchRates {
         if let DicingRate::Fixed(n) = self.rate {

@@ -24,6 +24,7 @@ mod build;
 mod collapse;
 mod parts;
 mod traverse;
+mod visit;
 
 use crate::ids::PatchId;
 

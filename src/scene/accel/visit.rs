@@ -1,0 +1,34 @@
+//! A walk through the tree that is led by boxes instead of a ray.
+
+use super::{EMPTY, LANES, LEAF, TopLevel, WideNode};
+use crate::ids::PatchId;
+use crate::math::Bounds;
+use glam::Vec3;
+
+impl WideNode {
+    fn bounds(&self, lane: usize) -> Bounds {
+        let corner = |first: usize| {
+            Vec3::new(self.planes[first][lane], self.planes[first + 1][lane], self.planes[first + 2][lane])
+        };
+        Bounds { min: corner(0), max: corner(3) }
+    }
+}
+
+impl TopLevel {
+    /// Calls `leaf` for every patch with its box, but for those in boxes that `enter` turns down. `enter` is asked about
+    /// boxes of several patches only.
+    pub fn visit(&self, mut enter: impl FnMut(&Bounds) -> bool, mut leaf: impl FnMut(PatchId, &Bounds)) {
+        let mut pending = vec![0u32];
+        while let Some(node) = pending.pop() {
+            let node = &self.nodes[node as usize];
+            for lane in 0..LANES {
+                match node.refs[lane] {
+                    EMPTY => {}
+                    reference if reference & LEAF != 0 => leaf(PatchId(reference & !LEAF), &node.bounds(lane)),
+                    reference if enter(&node.bounds(lane)) => pending.push(reference),
+                    _ => {}
+                }
+            }
+        }
+    }
+}
