@@ -255,12 +255,7 @@ impl<T> Worker<'_, '_, T> {
         if holds { Cell::Holds { error } } else { Cell::Split(Reason::Contradiction) }
     }
 
-    fn is_connected<const N: usize>(
-        &mut self,
-        place: &CellPlace,
-        probes: &[Probe; N],
-        smooths: &[Smooth; N],
-    ) -> bool {
+    fn is_connected<const N: usize>(&mut self, place: &CellPlace, probes: &[Probe; N], smooths: &[Smooth; N]) -> bool {
         let mut hits: Vec<_> = Vec::with_capacity(N);
         for first in probes.iter().map(|p| p.sample.first) {
             let hit = (MeshId(first.mesh), PatchId(first.patch));

@@ -128,11 +128,13 @@ impl Tile {
         (y * (TILE_SIDE / place.side) + x) as usize
     }
 
-    /// Splits the cells of a level that hold beside one with an edge in it: the edge may go on between their probes.
+    /// Splits the cells of a level that hold beside one with an edge in it: the edge may go on between their probes. The
+    /// silhouettes that matter to the smallest cells are known from footprints, so only edges of light spread to them.
     pub fn split_beside_edges(&mut self, level: usize) {
         let n = (TILE_SIDE / CELL_SIDES[level]) as usize;
+        let spreads = if level + 1 == CELL_SIDES.len() { Reason::is_edge_of_light } else { Reason::is_edge };
         let has_edge: Vec<bool> =
-            self.cells[level].iter().map(|cell| matches!(cell, Cell::Split(reason) if reason.is_edge())).collect();
+            self.cells[level].iter().map(|cell| matches!(cell, Cell::Split(reason) if spreads(*reason))).collect();
         for (k, cell) in self.cells[level].iter_mut().enumerate() {
             let (x, y) = (k % n, k / n);
             let rows = y.saturating_sub(1)..(y + 2).min(n);

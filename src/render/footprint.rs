@@ -293,12 +293,8 @@ fn reached(origin: [u32; 2], screen: &ScreenBox) -> Option<[u8; 4]> {
     let within = |x: f64, origin: u32| (x.floor() - f64::from(origin)).clamp(0.0, f64::from(REACH)) as u8;
     let first = screen.min - ROUNDING;
     let end = screen.max + ROUNDING + 1.0;
-    let rect @ [x0, y0, x1, y1] = [
-        within(first.x, origin[0]),
-        within(first.y, origin[1]),
-        within(end.x, origin[0]),
-        within(end.y, origin[1]),
-    ];
+    let rect @ [x0, y0, x1, y1] =
+        [within(first.x, origin[0]), within(first.y, origin[1]), within(end.x, origin[0]), within(end.y, origin[1])];
     (x0 < x1 && y0 < y1).then_some(rect)
 }
 

@@ -93,7 +93,9 @@ mod tests {
 
     #[test]
     fn points_of_a_box_are_seen_within_its_rectangle() {
-        let mesh = WorldMesh::new(shapes::cube(), DAffine3::from_translation(DVec3::X), DicingRate::Fixed(1), 1).unwrap();
+        let mesh =
+            WorldMesh::new(shapes::all().remove(0).1, DAffine3::from_translation(DVec3::X), DicingRate::Fixed(1), 1)
+                .unwrap();
         let b = Bounds { min: Vec3::splat(-4e6), max: Vec3::new(1e6, 5e6, 3e6) };
         for eye in [DVec3::new(3.0, 4.0, 9.0), DVec3::new(1.1, 0.1, -0.2), DVec3::new(1.0, -0.9, 1.5)] {
             let camera = CameraDescription { eye, at: DVec3::new(1.0, 0.3, 0.2), up: DVec3::Y, fov: 50.0 };

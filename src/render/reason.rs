@@ -58,7 +58,12 @@ impl Reason {
 
     /// Whether an edge was seen, which may go on in the neighbouring groups.
     pub(super) fn is_edge(self) -> bool {
-        matches!(self, Self::Silhouette | Self::Shadow | Self::Reflection | Self::Crease)
+        self.is_edge_of_light() || matches!(self, Self::Silhouette | Self::Crease)
+    }
+
+    /// Whether that edge is one that footprints know nothing of.
+    pub(super) fn is_edge_of_light(self) -> bool {
+        matches!(self, Self::Shadow | Self::Reflection)
     }
 }
 
