@@ -36,10 +36,10 @@ pub struct PictureArgs {
     /// Render only columns x0 to x1 - 1 and rows y0 to y1 - 1, with the values they have in the whole picture
     #[arg(long, value_name = "x0,x1,y0,y1", value_parser = crop, help_heading = PICTURE)]
     pub crop: Option<[u32; 4]>,
-    /// Trace every pixel (off), only those that need it (adaptive), or corners of patches (thesis, unchecked)
-    #[arg(long, value_name = "off|thesis|adaptive", default_value_t = Groups::Off, help_heading = PICTURE)]
+    /// Trace only the pixels that need it (adaptive), every pixel (off), or corners of patches (thesis, unchecked)
+    #[arg(long, value_name = "adaptive|off|thesis", default_value_t = Groups::Adaptive, help_heading = PICTURE)]
     pub groups: Groups,
-    /// Error that --groups adaptive may make, in display units (0 to 1 after sRGB); reads like 0.02 or 5/255; 0 is off
+    /// Error that --groups adaptive may make, in display units (0 to 1 after sRGB); reads like 0.02 or 5/255; 0: trace all
     #[arg(long, value_name = "E", default_value = "2/255", value_parser = display_units, help_heading = PICTURE)]
     pub tolerance: f32,
     /// The camera

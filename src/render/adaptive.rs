@@ -73,7 +73,8 @@ pub fn render_adaptive<T: Tracer>(
         let mut tracer = make_tracer();
         let shader = Shader::new(&mut tracer, appearance, settings);
         let footprints = Footprints::new(&scenery);
-        Worker { job: &job, footprints, shader, tile: Tile::new(), outcome: Outcome::default() }.work(&queue, &film)
+        Worker { job: &job, footprints, shader, tile: Tile::new(settings.size), outcome: Outcome::default() }
+            .work(&queue, &film)
     });
     let mut total = Outcome::default();
     outcomes.into_iter().for_each(|outcome| total.add(outcome));
@@ -142,10 +143,13 @@ impl<T: Tracer> Worker<'_, '_, T> {
             return;
         }
         self.tile.reset([tile.x0, tile.y0]);
-        if self.job.is_possible() {
+        if self.job.is_possible() && !self.footprints.is_crowded() {
             (0..CELL_SIDES.len()).for_each(|level| self.refine(level));
         } else {
             self.split_all();
+        }
+        if self.is_sampled_by_need() {
+            self.look_everywhere(tile);
         }
         for k in 0..TILE_SIDE.pow(2) {
             let pixel = [tile.x0 + even_bits(k), tile.y0 + even_bits(k >> 1)];
@@ -163,7 +167,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         self.outcome.seconds.interpolate += watch.elapsed().as_secs_f64() - traced;
     }
 
-    /// For integrators whose samples are random: what no patch reaches is known all the same.
+    /// For integrators whose samples are random, and crowds of patches: what no patch reaches is known all the same.
     fn split_all(&mut self) {
         for level in 0..CELL_SIDES.len() {
             for place in self.tile.cells_to_judge(level) {
@@ -174,9 +178,13 @@ impl<T: Tracer> Worker<'_, '_, T> {
     }
 
     fn refine(&mut self, level: usize) {
+        let is_hopeless = level + 1 == CELL_SIDES.len() && !self.tile.any_holds();
         for place in self.tile.cells_to_judge(level) {
             let cell = if self.footprints.is_empty(place.pixels()) {
                 Cell::Empty
+            } else if is_hopeless {
+                // Where no larger cell holds, the smallest cost more than they save.
+                Cell::Split(Reason::Every)
             } else {
                 place.probe_pixels().into_iter().for_each(|pixel| self.trace_probe(pixel));
                 self.judge(&place)
@@ -213,6 +221,9 @@ impl<T: Tracer> Worker<'_, '_, T> {
             Cell::Split(_) if self.footprints.is_empty(single(pixel)) => background,
             Cell::Split(reason) => {
                 let known = self.tile.probe(pixel).map(|p| (p.probe.sample, p.misses));
+                if let Some((sample, misses)) = known.filter(|_| self.is_sampled_by_need() && self.is_even(pixel)) {
+                    return PixelRecord { reason, samples: 1, ..PixelRecord::of_sample(&sample, misses) };
+                }
                 PixelRecord { reason, ..interpolation.pixels().trace_from(&mut self.shader, pixel, known) }
             }
         }
@@ -224,7 +235,42 @@ fn even_bits(k: u32) -> u32 {
     (0..16).fold(0, |bits, i| bits | (k >> (2 * i) & 1) << i)
 }
 
+/// With several samples a pixel: few where one looks like its neighbours.
+impl<T: Tracer> Worker<'_, '_, T> {
+    fn is_sampled_by_need(&self) -> bool {
+        self.job.settings.spp > 1 && self.job.is_possible() && !self.footprints.is_crowded()
+    }
+
+    /// Traces the first sample of every pixel that is not interpolated.
+    fn look_everywhere(&mut self, tile: PixelRect) {
+        let [width, height] = self.job.settings.size;
+        for pixel in intersection(tile, PixelRect::whole([width, height])).pixels() {
+            if matches!(self.tile.find(pixel).1, Cell::Split(_)) {
+                self.trace_probe(pixel);
+            }
+        }
+    }
+
+    /// Whether a traced pixel and those around it, all of the tile, show one mesh in about one colour.
+    fn is_even(&self, [x, y]: [u32; 2]) -> bool {
+        let Some(own) = self.tile.probe([x, y]) else { return false };
+        let around = (0..9).map(|k| [(x + k % 3).checked_sub(1), (y + k / 3).checked_sub(1)]);
+        around.into_iter().all(|place| match place {
+            [Some(x), Some(y)] if self.tile.has([x, y]) => match (self.tile.probe([x, y]), self.tile.find([x, y]).1) {
+                (Some(other), _) => self.job.is_alike(&own.probe, &other.probe),
+                (None, cell) => matches!(cell, Cell::Holds { .. }),
+            },
+            _ => false,
+        })
+    }
+}
+
 impl PixelRecord {
+    fn of_sample(sample: &Sample, misses: u32) -> Self {
+        let background = Self::background(sample.radiance.to_array());
+        Self { first: sample.first, misses, ..background }
+    }
+
     fn interpolated(self) -> Self {
         Self { reason: Reason::Interpolated, ..self }
     }
@@ -343,6 +389,12 @@ impl<'a> Interpolation<'a> {
             reason: if is_corner { Reason::Corner } else { Reason::Probe },
             error: 0.0,
         })
+    }
+
+    /// Whether the mean of samples between two pixels differs from either by less than the tolerance, as far as one can tell.
+    fn is_alike(&self, a: &Probe, b: &Probe) -> bool {
+        let difference = display_difference(a.sample.radiance, b.sample.radiance);
+        a.sample.first.mesh == b.sample.first.mesh && difference <= self.settings.tolerance
     }
 
     /// A number for a cell: where it begins, in units of the smallest.

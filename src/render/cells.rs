@@ -42,6 +42,8 @@ pub(super) struct TracedProbe {
 /// A tile at work.
 pub(super) struct Tile {
     origin: [u32; 2],
+    /// Of the whole picture.
+    size: [u32; 2],
     probes: Vec<Option<TracedProbe>>,
     cells: [Vec<Cell>; CELL_SIDES.len()],
 }
@@ -71,9 +73,10 @@ impl Tile {
     /// Bytes of a tile.
     pub const BYTES: usize = PROBES.pow(2) as usize * size_of::<Option<TracedProbe>>();
 
-    pub fn new() -> Self {
+    /// A tile of a picture of `size` pixels.
+    pub fn new(size: [u32; 2]) -> Self {
         let cells = CELL_SIDES.map(|side| vec![Cell::Undivided; (TILE_SIDE / side).pow(2) as usize]);
-        Self { origin: [0; 2], probes: vec![None; PROBES.pow(2) as usize], cells }
+        Self { origin: [0; 2], size, probes: vec![None; PROBES.pow(2) as usize], cells }
     }
 
     /// Begins another tile.
@@ -86,6 +89,11 @@ impl Tile {
     /// The probe at a pixel of the tile or right beside or below it.
     pub fn probe(&self, pixel: [u32; 2]) -> Option<&TracedProbe> {
         self.probes[self.probe_idx(pixel)].as_ref()
+    }
+
+    /// Whether a pixel is one of the tile's.
+    pub fn has(&self, [x, y]: [u32; 2]) -> bool {
+        x.wrapping_sub(self.origin[0]) < TILE_SIDE && y.wrapping_sub(self.origin[1]) < TILE_SIDE
     }
 
     pub fn set_probe(&mut self, pixel: [u32; 2], probe: TracedProbe) {
@@ -103,19 +111,25 @@ impl Tile {
         CellPlace { level, x: x - x % side, y: y - y % side, side }
     }
 
-    /// Cells of a level whose larger cell was split.
+    /// Cells of a level within the picture whose larger cell was split.
     pub fn cells_to_judge(&self, level: usize) -> Vec<CellPlace> {
         let side = CELL_SIDES[level];
         let n = TILE_SIDE / side;
         let places =
             (0..n * n).map(|k| self.place(level, [self.origin[0] + k % n * side, self.origin[1] + k / n * side]));
         places
+            .filter(|p| p.x < self.size[0] && p.y < self.size[1])
             .filter(|p| level == 0 || matches!(self.cell(&self.place(level - 1, [p.x, p.y])), Cell::Split(_)))
             .collect()
     }
 
     pub fn cell(&self, place: &CellPlace) -> Cell {
         self.cells[place.level][self.cell_idx(place)]
+    }
+
+    /// Whether any cell holds so far.
+    pub fn any_holds(&self) -> bool {
+        self.cells.iter().flatten().any(|cell| matches!(cell, Cell::Holds { .. }))
     }
 
     pub fn set_cell(&mut self, place: &CellPlace, cell: Cell) {
@@ -165,7 +179,7 @@ mod tests {
 
     #[test]
     fn edges_split_the_cells_beside_them() {
-        let mut tile = Tile::new();
+        let mut tile = Tile::new([200, 200]);
         tile.reset([64, 128]);
         for place in tile.cells_to_judge(0) {
             tile.set_cell(&place, Cell::Holds { error: 0.0 });
@@ -179,7 +193,7 @@ mod tests {
 
     #[test]
     fn the_smallest_cell_of_a_pixel_is_found() {
-        let mut tile = Tile::new();
+        let mut tile = Tile::new([64, 128]);
         tile.reset([0, 64]);
         let large = tile.place(0, [20, 70]);
         tile.set_cell(&large, Cell::Split(Reason::Crease));

@@ -28,14 +28,23 @@ use crate::topology::{HalfEdges, NONE};
 /// Side, in pixels, of parts that are not cut further.
 const SMALL: f32 = 9.0;
 
+/// Side, in pixels, of parts that are marked as a whole: marking a pixel too many costs a camera ray.
+const COARSE: f32 = 20.0;
+
 /// Side, in pixels, of the largest parts that show in four corners which side is seen of them.
 const MAX_SIDED: f32 = 36.0;
 
-/// Most parts that one is cut into along a side.
-const MAX_CUTS: u32 = 4;
+/// Most parts that one is cut into, along each side.
+const PIECES: u32 = 4;
 
-/// Parts of a tile that are remembered. A tile with more has several for each pixel: grouping does not pay there.
-const MAX_PARTS: usize = 1 << 14;
+/// Patches of a tile in which grouping pays: with more there is one for every six pixels, or many behind one another.
+const MAX_WHOLE: usize = 640;
+
+/// Parts of a tile that are cut. What takes more to know is better traced: a cut takes as long as some ten pixels.
+const MAX_CUT: u32 = 300;
+
+/// Parts of a tile.
+const MAX_PARTS: usize = MAX_WHOLE + (MAX_CUT * PIECES * PIECES) as usize;
 
 /// Boxes on the picture are this much larger, in pixels, than computed.
 const ROUNDING: f64 = 1e-3;
@@ -66,8 +75,10 @@ pub(super) struct Footprints<'a> {
     /// Those of whole patches first.
     parts: Vec<Part>,
     n_whole: usize,
-    /// Whether there was no room for a patch.
+    /// Whether there are more patches than are remembered.
     is_crowded: bool,
+    /// Parts that were cut.
+    n_cut: u32,
     dicer: Dicer,
     last_mesh: Option<MeshId>,
 }
@@ -93,7 +104,7 @@ struct Part {
 #[derive(Clone, Copy)]
 enum Children {
     Unknown,
-    /// It is small, has one cell, or there is no room.
+    /// It is small, has one cell, or enough was cut.
     None,
     Some {
         first: u16,
@@ -119,6 +130,20 @@ pub(super) struct Claim<'a> {
     pub farthest: f32,
 }
 
+impl Claim<'_> {
+    fn side(&self) -> Side {
+        if self.outside { Side::Outside } else { Side::Inside }
+    }
+}
+
+impl Part {
+    /// Whether some of it may be seen at these pixels, not hidden behind what lies at depth `farthest`.
+    fn is_seen(&self, [left, top, right, bottom]: [u8; 4], farthest: f32) -> bool {
+        let [x0, y0, x1, y1] = self.rect;
+        x0 < right && x1 > left && y0 < bottom && y1 > top && self.nearest <= farthest
+    }
+}
+
 impl<'a> Scenery<'a> {
     pub fn new(world: &'a World, camera: &'a Camera, settings: &RenderSettings) -> Self {
         let views = world.meshes().iter().map(|mesh| MeshView::new(mesh, camera)).collect();
@@ -142,6 +167,7 @@ impl<'a> Footprints<'a> {
             parts: Vec::new(),
             n_whole: 0,
             is_crowded: false,
+            n_cut: 0,
             dicer: Dicer::default(),
             last_mesh: None,
         }
@@ -153,6 +179,7 @@ impl<'a> Footprints<'a> {
         self.covered.fill(0);
         self.parts.clear();
         self.is_crowded = false;
+        self.n_cut = 0;
         let scenery = self.scenery;
         for (k, mesh) in scenery.world.meshes().iter().enumerate() {
             let id = MeshId::from(k);
@@ -165,7 +192,7 @@ impl<'a> Footprints<'a> {
 
     fn add_whole(&mut self, mesh: MeshId, patch: PatchId, b: &Bounds) {
         let Some(part) = self.part(mesh, patch, None, b) else { return };
-        if self.parts.len() < MAX_PARTS {
+        if self.parts.len() < MAX_WHOLE {
             self.parts.push(part);
         } else {
             self.is_crowded = true;
@@ -187,7 +214,9 @@ impl<'a> Footprints<'a> {
         if is_marked(&self.covered, self.parts[part].rect) {
             return;
         }
-        match self.children(part) {
+        let children =
+            if self.is_crowded || self.parts[part].extent <= COARSE { Children::None } else { self.children(part) };
+        match children {
             Children::Some { first, n } => (0..usize::from(n)).for_each(|k| self.cover(usize::from(first) + k)),
             _ => mark(&mut self.covered, self.parts[part].rect),
         }
@@ -196,6 +225,11 @@ impl<'a> Footprints<'a> {
     /// Whether no patch reaches the tile.
     pub fn is_bare(&self) -> bool {
         self.covered == [0; REACH as usize]
+    }
+
+    /// Whether there are too many patches to know more than which pixels they reach.
+    pub fn is_crowded(&self) -> bool {
+        self.is_crowded
     }
 
     /// Whether no patch reaches any of these pixels, all within the tile.
@@ -209,19 +243,37 @@ impl<'a> Footprints<'a> {
     pub fn agree(&mut self, pixels: PixelRect, claim: &Claim<'_>) -> bool {
         let [x, y] = self.origin;
         let pixels = [pixels.x0 - x, pixels.y0 - y, pixels.x1 - x, pixels.y1 - y].map(|n| n as u8);
-        !self.is_crowded && (0..self.n_whole).all(|part| self.agrees(part, pixels, claim))
+        // What disagrees is often known already: look there before anything is cut.
+        (0..self.n_whole).all(|part| self.may_agree(part, pixels, claim))
+            && (0..self.n_whole).all(|part| self.agrees(part, pixels, claim))
+    }
+
+    /// As [`agrees`](Self::agrees), as far as that is known already.
+    fn may_agree(&self, k: usize, pixels: [u8; 4], claim: &Claim<'_>) -> bool {
+        let part = &self.parts[k];
+        if !part.is_seen(pixels, claim.farthest) {
+            return true;
+        }
+        let is_small = part.extent <= SMALL;
+        match part.children {
+            Children::Unknown if !is_small => true,
+            Children::Some { first, n } => {
+                (first..first + u16::from(n)).all(|child| self.may_agree(usize::from(child), pixels, claim))
+            }
+            _ => {
+                part.side.is_none_or(|side| side == claim.side())
+                    && self.scenery.touches_any(part.mesh, part.patch, claim.hits)
+            }
+        }
     }
 
     fn agrees(&mut self, k: usize, pixels: [u8; 4], claim: &Claim<'_>) -> bool {
         let part = &self.parts[k];
-        let ([x0, y0, x1, y1], [left, top, right, bottom]) = (part.rect, pixels);
-        let overlaps = x0 < right && x1 > left && y0 < bottom && y1 > top;
-        if !overlaps || part.nearest > claim.farthest {
+        if !part.is_seen(pixels, claim.farthest) {
             return true;
         }
-        let side = if claim.outside { Side::Outside } else { Side::Inside };
         let may_hold = part.extent <= MAX_SIDED && self.scenery.touches_any(part.mesh, part.patch, claim.hits);
-        if may_hold && self.side(k) == side {
+        if may_hold && self.side(k) == claim.side() {
             return true;
         }
         let Children::Some { first, n } = self.children(k) else { return false };
@@ -241,10 +293,11 @@ impl<'a> Footprints<'a> {
         let mesh = self.turn_to(id);
         let rates = mesh.patch_rates(patch);
         let [i, j] = cells.unwrap_or([[0, rates.n_u as u16], [0, rates.n_v as u16]]).map(|range| range.map(u32::from));
-        let [n_i, n_j] = [i, j].map(|[from, to]| (to - from).min(MAX_CUTS));
-        if n_i * n_j == 1 || self.parts.len() + (n_i * n_j) as usize > MAX_PARTS {
+        let [n_i, n_j] = [i, j].map(|[from, to]| (to - from).min(PIECES));
+        if n_i * n_j == 1 || self.n_cut == MAX_CUT {
             return Children::None;
         }
+        self.n_cut += 1;
         let first = self.parts.len();
         let cut = |[from, to]: [u32; 2], n: u32, k: u32| [k, k + 1].map(|k| from + k * (to - from) / n);
         for (a, b) in (0..n_j).flat_map(|b| (0..n_i).map(move |a| (a, b))) {

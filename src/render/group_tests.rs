@@ -18,6 +18,8 @@ use glam::{DAffine3, DVec3, Vec3};
 use parking_lot::Mutex;
 use std::sync::atomic::AtomicBool;
 
+mod fuzz;
+
 /// Meshes with materials, lights, and a camera.
 struct Stage {
     world: World,
@@ -276,4 +278,41 @@ fn the_published_algorithm_traces_corners_alone() {
     let items = ItemBuffer::new(&stage.world, &stage.camera, &settings(Groups::Thesis), 1, 1).unwrap();
     let n_groups = groups::PixelGroups::new(&items).len() as u64;
     assert!(rendered.rays.primary <= 4 * n_groups && rendered.rays.primary == rendered.pixels.of(Reason::Corner));
+}
+
+#[test]
+fn crowds_of_patches_are_traced_and_show_what_they_show_without_groups() {
+    let at = |k: u32| {
+        let place = DVec3::new(f64::from(k % 17) * 0.2 - 1.6, f64::from(k / 17) * 0.25 - 1.2, 2.0);
+        DAffine3::from_scale_rotation_translation(DVec3::splat(0.05), Default::default(), place)
+    };
+    let crowd: Vec<_> = (0..170).map(at).collect();
+    let stage = Stage::new(DVec3::new(0.0, 0.5, 9.0), &crowd, Material::default());
+    let size = [64, 64];
+    let at = |groups| RenderSettings { size, window: PixelRect::whole(size), ..settings(groups) };
+    let full = stage.render(&at(Groups::Off), 2);
+    let grouped = stage.render(&at(Groups::Adaptive), 2);
+    assert_eq!(full.film.colors(), grouped.film.colors());
+    assert!(grouped.pixels.of(Reason::Every) > 1000 && grouped.pixels.of(Reason::Interpolated) == 0);
+}
+
+#[test]
+fn edge_pixels_alone_get_more_samples_and_the_mean_stays_within_tolerance() {
+    let stage = Stage::plain();
+    let at = |groups| RenderSettings { spp: 16, ..settings(groups) };
+    let full = stage.render(&at(Groups::Off), 2);
+    let aovs = vec![Aov::Samples, Aov::Reason];
+    let grouped = stage.render(&RenderSettings { aovs, ..at(Groups::Adaptive) }, 2);
+    let share = share_above(&full.film, &grouped.film, grouped_tolerance());
+    assert!(share <= 0.01, "{share}");
+    let samples = ids(&grouped.film, Aov::Samples).iter().zip(ids(&grouped.film, Aov::Reason));
+    for (&n, &reason) in samples {
+        let expected: &[u32] = match Reason::ALL[reason as usize].1 {
+            Reason::Interpolated | Reason::Background => &[0],
+            Reason::Corner | Reason::Probe => &[1],
+            _ => &[1, 16],
+        };
+        assert!(expected.contains(&n), "{n}");
+    }
+    assert!(grouped.rays.total() * 3 < full.rays.total(), "{} of {}", grouped.rays.total(), full.rays.total());
 }

@@ -7,7 +7,7 @@ use std::ops::AddAssign;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum Reason {
-    /// Traced: groups are off, or the integrator is not one that can be interpolated.
+    /// Traced: groups are off, or do not pay here, or the integrator is not one that can be interpolated.
     #[default]
     Every,
     /// Traced: a corner of a group.

@@ -201,3 +201,18 @@ fn a_tree_takes_less_than_66_bytes_a_patch() {
     let per_patch = tree.bytes() as f64 / 20_000.0;
     assert!(per_patch < 66.0, "{per_patch}");
 }
+
+#[test]
+fn a_visit_finds_every_patch_but_for_those_in_boxes_that_are_not_entered() {
+    let boxes = scattered(3000, 4e6);
+    let tree = TopLevel::build(&boxes);
+    let is_left = |b: &Bounds| b.min.x < 0.0;
+    let mut found = vec![];
+    tree.visit(is_left, |patch, b| {
+        assert_eq!(*b, boxes[patch.idx()]);
+        found.push(patch.idx());
+    });
+    found.sort_unstable();
+    assert!(found.windows(2).all(|w| w[0] < w[1]) && found.len() < 3000);
+    assert!((0..3000).all(|k| !is_left(&boxes[k]) || found.binary_search(&k).is_ok()));
+}
