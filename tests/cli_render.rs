@@ -158,7 +158,7 @@ fn channels(path: &Path) -> Vec<String> {
 #[test]
 fn layers_tell_what_is_seen() {
     let folder = folder();
-    render(folder.path(), "cube.obj -o out.exr --size 20x20 --aov Z,N,patch,samples --rate fixed:4 --quiet").success();
+    render(folder.path(), "cube.obj -o out.exr --size 20x20 --aov Z,N,patch,samples --rate fixed:4 --groups off --quiet").success();
     let image = read_all_flat_layers_from_file(folder.path().join("out.exr")).unwrap();
     let channel = |name: &str, pixel: usize| {
         let list = &image.layer_data[0].channel_data.list;
@@ -208,7 +208,7 @@ fn png_is_the_exr_s_colours_in_srgb() {
 fn statistics_add_up() {
     let folder = folder();
     for (cache, capacity) in [("unbounded", serde_json::Value::Null), ("64K", 65_536.into()), ("0", 0.into())] {
-        let line = format!("scene.toml -o out.png --stats s.json --threads 2 --cache {cache}");
+        let line = format!("scene.toml -o out.png --stats s.json --threads 2 --groups off --cache {cache}");
         render(folder.path(), &line).success().stdout("").stderr(predicate::str::contains("lookups hit"));
         let s = stats(folder.path());
         let n = |path: &str| s.pointer(path).and_then(|v| v.as_u64()).unwrap_or_else(|| panic!("{path} in {s}"));

@@ -80,7 +80,6 @@ pub(super) struct Footprints<'a> {
     /// Parts that were cut.
     n_cut: u32,
     dicer: Dicer,
-    last_mesh: Option<MeshId>,
 }
 
 /// Cells of a patch.
@@ -169,7 +168,6 @@ impl<'a> Footprints<'a> {
             is_crowded: false,
             n_cut: 0,
             dicer: Dicer::default(),
-            last_mesh: None,
         }
     }
 
@@ -290,7 +288,7 @@ impl<'a> Footprints<'a> {
 
     fn cut(&mut self, k: usize) -> Children {
         let Part { mesh: id, patch, cells, .. } = self.parts[k];
-        let mesh = self.turn_to(id);
+        let mesh = self.scenery.world.mesh(id);
         let rates = mesh.patch_rates(patch);
         let [i, j] = cells.unwrap_or([[0, rates.n_u as u16], [0, rates.n_v as u16]]).map(|range| range.map(u32::from));
         let [n_i, n_j] = [i, j].map(|[from, to]| (to - from).min(PIECES));
@@ -308,20 +306,12 @@ impl<'a> Footprints<'a> {
         Children::Some { first: first as u16, n: (self.parts.len() - first) as u8 }
     }
 
-    /// The mesh, with a dicer that has forgotten others.
-    fn turn_to(&mut self, id: MeshId) -> &'a WorldMesh {
-        if self.last_mesh.replace(id) != Some(id) {
-            self.dicer.forget();
-        }
-        self.scenery.world.mesh(id)
-    }
-
     fn side(&mut self, k: usize) -> Side {
         if let Some(side) = self.parts[k].side {
             return side;
         }
         let part = self.parts[k];
-        let mesh = self.turn_to(part.mesh);
+        let mesh = self.scenery.world.mesh(part.mesh);
         let rates = mesh.patch_rates(part.patch);
         let whole = [[0, rates.n_u as u16], [0, rates.n_v as u16]];
         let [[i0, i1], [j0, j1]] = part.cells.unwrap_or(whole);

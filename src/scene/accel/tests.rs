@@ -205,7 +205,7 @@ fn a_tree_takes_less_than_66_bytes_a_patch() {
 #[test]
 fn a_visit_finds_every_patch_but_for_those_in_boxes_that_are_not_entered() {
     let boxes = scattered(3000, 4e6);
-    let tree = TopLevel::build(&boxes);
+    let tree = TopLevel::build(&boxes, 1);
     let is_left = |b: &Bounds| b.min.x < 0.0;
     let mut found = vec![];
     tree.visit(is_left, |patch, b| {
