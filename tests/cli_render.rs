@@ -158,7 +158,11 @@ fn channels(path: &Path) -> Vec<String> {
 #[test]
 fn layers_tell_what_is_seen() {
     let folder = folder();
-    render(folder.path(), "cube.obj -o out.exr --size 20x20 --aov Z,N,patch,samples --rate fixed:4 --groups off --quiet").success();
+    render(
+        folder.path(),
+        "cube.obj -o out.exr --size 20x20 --aov Z,N,patch,samples --rate fixed:4 --groups off --quiet",
+    )
+    .success();
     let image = read_all_flat_layers_from_file(folder.path().join("out.exr")).unwrap();
     let channel = |name: &str, pixel: usize| {
         let list = &image.layer_data[0].channel_data.list;
