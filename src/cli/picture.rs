@@ -40,7 +40,7 @@ pub struct PictureArgs {
     #[arg(long, value_name = "adaptive|off|thesis", default_value_t = Groups::Adaptive, help_heading = PICTURE)]
     pub groups: Groups,
     /// Error that --groups adaptive may make, in display units (0 to 1 after sRGB); reads like 0.02 or 5/255; 0: trace all
-    #[arg(long, value_name = "E", default_value = "2/255", value_parser = display_units, help_heading = PICTURE)]
+    #[arg(long, value_name = "E", default_value = "1/255", value_parser = display_units, help_heading = PICTURE)]
     pub tolerance: f32,
     /// The camera
     #[command(flatten)]
