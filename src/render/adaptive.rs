@@ -266,7 +266,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
 }
 
 impl PixelRecord {
-    fn of_sample(sample: &Sample, misses: u32) -> Self {
+    fn of_sample(sample: &Sample, misses: Built) -> Self {
         let background = Self::background(sample.radiance.to_array());
         Self { first: sample.first, misses, ..background }
     }
