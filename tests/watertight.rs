@@ -62,7 +62,8 @@ fn seeds() -> Range<u64> {
 #[test]
 fn borders_of_random_meshes_are_bit_identical() {
     let mut points = 0;
-    for seed in seeds() {
+    // Failed once: a hidden face spoke for an edge of many sheets; holes alone took passages of an edge apart.
+    for seed in [2059, 2877].into_iter().chain(seeds()) {
         let mut mesh = random_mesh(seed);
         if seed % 3 == 0 {
             mesh.edits = random_edits(&mesh, seed);

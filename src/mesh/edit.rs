@@ -76,6 +76,11 @@ impl Edit {
         FaceId(self.path[0])
     }
 
+    /// Whether it changes points or sharpness after the control mesh, so that faces around it are refined one by one.
+    pub fn is_refined(&self) -> bool {
+        self.kind != EditKind::Face && !self.children().is_empty()
+    }
+
     /// The child chosen in each step; its length is the level at which the edit applies.
     pub fn children(&self) -> &[u32] {
         match self.kind {

@@ -96,13 +96,16 @@ impl Topology {
         tangles.iter().for_each(|tangle| topology.add_nonmanifold(tangle, &mut nonmanifold));
         let infinite = topology.tag_edges(mesh, &by_vertex);
         drop(by_vertex);
-        if !mesh.edits.is_empty() {
+        if mesh.edits.iter().any(Edit::is_refined) {
             topology.separate_passages();
         }
         topology.edit_edges(mesh);
         topology.tag_vertices(mesh, &nonmanifold, n_threads);
         topology.edit_vertices(mesh);
         topology.hide_faces(mesh, &infinite, &nonmanifold);
+        if topology.hidden.is_some() && !topology.nonmanifold_vertex_owner.is_empty() {
+            topology.let_visible_faces_own();
+        }
         topology
     }
 
@@ -373,6 +376,27 @@ impl Topology {
         match self.nonmanifold_edge_owner.get(&h) {
             Some(&owner) if visible(owner) => owner,
             _ => h,
+        }
+    }
+
+    /// Non-manifold edges and vertices that a hidden face speaks for get another owner: alone, each sheet would round for itself.
+    fn let_visible_faces_own(&mut self) {
+        let mut smallest: FxHashMap<u32, u32> = FxHashMap::default();
+        for (&h, &owner) in self.nonmanifold_edge_owner.iter().filter(|(h, _)| !self.is_hidden(FaceId(self.face(**h))))
+        {
+            let known = smallest.entry(owner).or_insert(h);
+            *known = h.min(*known);
+        }
+        for owner in self.nonmanifold_edge_owner.values_mut() {
+            *owner = smallest.get(owner).copied().unwrap_or(*owner);
+        }
+        for h in 0..self.n_half_edges() as u32 {
+            let v = HalfEdges::vertex(self, h);
+            let Some(&owner) = self.nonmanifold_vertex_owner.get(&v) else { continue };
+            let is_hidden = |h: u32| self.is_hidden(FaceId(self.face(h)));
+            if is_hidden(owner) && !is_hidden(h) {
+                self.nonmanifold_vertex_owner.insert(v, h);
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! The edits that change points or sharpness, by the path that leads to them.
 
 use crate::ids::FaceId;
-use crate::mesh::{Edit, EditKind};
+use crate::mesh::Edit;
 use rustc_hash::FxHashMap;
 
 /// A face of some level on the way to an edit, that face included.
@@ -27,7 +27,7 @@ impl EditTrie {
     pub fn new(edits: &[Edit]) -> Self {
         let mut trie = Self::default();
         for (i, edit) in edits.iter().enumerate() {
-            if edit.kind != EditKind::Face && !edit.children().is_empty() {
+            if edit.is_refined() {
                 trie.insert(i as u32, edit);
             }
         }
