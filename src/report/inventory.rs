@@ -109,10 +109,10 @@ impl Inventory {
 
     fn add_mesh(&mut self, mesh: &WorldMesh) {
         let (surface, topology) = (mesh.surface(), mesh.surface().topology());
-        self.plans += surface.library().len();
+        self.plans += surface.plans().len();
         self.resident.topology += topology.bytes();
         self.resident.control_points += surface.control_bytes();
-        self.resident.plans += surface.library().bytes();
+        self.resident.plans += surface.plans().bytes();
         self.topology = sum(&self.topology, &topology.counts());
         for valence in valences(topology) {
             *self.valences.entry(valence).or_default() += 1;

@@ -69,7 +69,7 @@ pub struct Surface {
     topology: Topology,
     lattice: Lattice,
     control: Vec<[f32; 3]>,
-    library: PlanLibrary,
+    plans: PlanLibrary,
     plan_of_face: Vec<NodeId>,
     /// First patch of each face, then the total; `None` if every face is one patch.
     first_patch: Option<Vec<u32>>,
@@ -113,7 +113,7 @@ impl Surface {
         let topology = Topology::new(mesh, n_threads);
         let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
         let sites = EditSites::new(&mesh.edits, &topology);
-        let (library, plan_of_face) = plan_faces(&topology, rules, n_threads, &sites);
+        let (plans, plan_of_face) = plan_faces(&topology, rules, n_threads, &sites);
         let first_patch = (!topology.all_quads()).then(|| first_patches(&mesh.face_sizes));
         if first_patch.as_ref().is_some_and(|f| f.last().is_some_and(|&n| n > u32::MAX / 2)) {
             return Err(Error::input("the mesh has more than 2^31 patches: split it"));
@@ -121,9 +121,9 @@ impl Surface {
         let lattice = Lattice { center: DVec3::ZERO, step: 1.0 };
         let (control, edited) = (Vec::new(), EditedPatches::default());
         let id = SURFACES.fetch_add(1, Ordering::Relaxed);
-        let mut surface = Self { id, topology, lattice, control, library, plan_of_face, first_patch, edited };
+        let mut surface = Self { id, topology, lattice, control, plans, plan_of_face, first_patch, edited };
         surface.place(mesh, &sites)?;
-        surface.library.seal();
+        surface.plans.seal();
         Ok(surface)
     }
 
@@ -152,7 +152,7 @@ impl Surface {
     ) -> Result<EditedPatches> {
         let first_patch = self.first_patch.as_deref();
         let patch_of = |face, sub| patch_of(first_patch, face, sub);
-        EditedPatches::new(mesh, &self.topology, sites, &mut self.library, self.lattice, control_point, patch_of)
+        EditedPatches::new(mesh, &self.topology, sites, &mut self.plans, self.lattice, control_point, patch_of)
     }
 
     /// Half-edges and tags.
@@ -161,8 +161,8 @@ impl Surface {
     }
 
     /// The plan library.
-    pub fn library(&self) -> &PlanLibrary {
-        &self.library
+    pub fn plans(&self) -> &PlanLibrary {
+        &self.plans
     }
 
     /// The vertex lattice.
@@ -231,7 +231,7 @@ impl Surface {
     pub fn bytes(&self) -> usize {
         self.topology.bytes()
             + self.control_bytes()
-            + self.library.bytes()
+            + self.plans.bytes()
             + 4 * self.plan_of_face.len()
             + self.first_patch.as_ref().map_or(0, |f| 4 * f.len())
             + self.edited.bytes()
@@ -256,12 +256,12 @@ impl Surface {
         }
         points.ring.clear();
         if size == 4 {
-            let sources = points.walker.sources(&self.topology, first, self.library.outer_tags());
+            let sources = points.walker.sources(&self.topology, first, self.plans.outer_tags());
             points.ring.extend(sources.iter().map(|&v| self.control_point(v)));
         } else {
             self.load_polygon(face, points);
             let parent = &points.polygon;
-            points.node = Evaluator::child_ring(&self.library, points.node, parent, sub as usize, &mut points.ring);
+            points.node = Evaluator::child_ring(&self.plans, points.node, parent, sub as usize, &mut points.ring);
         }
     }
 
@@ -272,10 +272,10 @@ impl Surface {
         }
         points.polygon_face = Some((self.id, face));
         let (first, _) = self.topology.face_corners(face.0);
-        let sources = points.walker.sources(&self.topology, first, self.library.outer_tags());
+        let sources = points.walker.sources(&self.topology, first, self.plans.outer_tags());
         points.polygon.clear();
         points.polygon.extend(sources.iter().map(|&v| self.control_point(v)));
-        Evaluator::refine_polygon(&self.library, points.node, &mut points.polygon);
+        Evaluator::refine_polygon(&self.plans, points.node, &mut points.polygon);
     }
 
     /// The quadtree of a patch under edits.
@@ -296,9 +296,9 @@ impl Surface {
         if points.node == REGULAR {
             evaluator.regular_grid(&points.control, us, vs, out);
         } else if let Some(tree) = self.tree(points) {
-            evaluator.edited_grid(&self.library, tree, us, vs, out);
+            evaluator.edited_grid(&self.plans, tree, us, vs, out);
         } else {
-            evaluator.grid(&self.library, points.node, &points.ring, us, vs, out);
+            evaluator.grid(&self.plans, points.node, &points.ring, us, vs, out);
         }
     }
 
@@ -307,9 +307,9 @@ impl Surface {
         if points.node == REGULAR {
             sample_regular(&points.control, u, v)
         } else if let Some(tree) = self.tree(points) {
-            evaluator.edited_sample(&self.library, tree, u, v)
+            evaluator.edited_sample(&self.plans, tree, u, v)
         } else {
-            evaluator.sample(&self.library, points.node, &points.ring, u, v)
+            evaluator.sample(&self.plans, points.node, &points.ring, u, v)
         }
     }
 
@@ -333,9 +333,9 @@ impl Surface {
             evaluator.grow_by_hull(&mut bounds, &points.control, u, v);
             bounds
         } else if let Some(tree) = self.tree(points) {
-            evaluator.edited_bounds(&self.library, tree, u, v, depth)
+            evaluator.edited_bounds(&self.plans, tree, u, v, depth)
         } else {
-            evaluator.bounds(&self.library, points.node, &points.ring, u, v, depth)
+            evaluator.bounds(&self.plans, points.node, &points.ring, u, v, depth)
         }
     }
 }

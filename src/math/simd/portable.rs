@@ -128,6 +128,8 @@ impl Kernel for Portable {
     fn transposed_integers(self, x: [[f64; 4]; 4]) -> [[i32; 4]; 3] {
         from_fn(|axis| from_fn(|i| x[i][axis] as i32))
     }
+    // SAFETY: nothing here relies on the caller's promise: a place outside `bytes` panics. The trait says `unsafe` for kernels
+    // that read without looking.
     #[inline(always)]
     unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> [f32; 8] {
         from_fn(|k| {
