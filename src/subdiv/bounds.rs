@@ -72,9 +72,8 @@ impl Evaluator {
             }
             Plan::Split { rows, children, .. } => {
                 let start = self.points.len();
-                let halves = [half_range(u, 0.0), half_range(u, 1.0), half_range(v, 0.0), half_range(v, 1.0)];
-                let n_quarters = [0, 1, 2, 3].map(|k| usize::from(halves[k].is_some()));
-                let is_alone = (n_quarters[0] + n_quarters[1]) * (n_quarters[2] + n_quarters[3]) == 1;
+                let is_in_one_half = |range| half_range(range, 0.0).is_some() != half_range(range, 1.0).is_some();
+                let is_alone = is_in_one_half(u) && is_in_one_half(v);
                 let refined = if is_alone { None } else { Some(self.refine(library, *rows, ring)) };
                 let mark = self.points.len();
                 for (k, child) in children.iter().enumerate() {

@@ -176,16 +176,6 @@ impl SidePoint {
     }
 }
 
-/// A border vertex of a grid that is being diced: vertex (i, j) of it, which is vertex `along + at` of `n` of a side.
-struct BorderVertex {
-    side: usize,
-    n: u32,
-    along: u32,
-    i: usize,
-    j: usize,
-    at: usize,
-}
-
 /// The edge point that border vertex `i` of `n` snaps to where the side has only `rate` segments.
 pub fn snapped(i: u32, n: u32, rate: u32) -> u32 {
     ((2 * u64::from(i) * u64::from(rate) + u64::from(n)) / (2 * u64::from(n))) as u32
@@ -211,64 +201,55 @@ impl Dicer {
         let vs = (j0..=j1).map(|j| f64::from(j) / n_v);
         surface.grid(&self.points[lane], &mut self.evaluator, us, vs, &mut self.out);
         out.round(&self.out, n_i, Rounding { shift: LATTICE_SHIFT, guard: GUARD });
-        for (side, at, end, j) in [(0, j0, 0, 0), (2, j1, rates.n_v, n_j - 1)] {
-            if at == end {
-                for i in 0..n_i {
-                    self.settle(
-                        surface,
-                        patch,
-                        rates,
-                        BorderVertex { side, n: rates.n_u, along: i0, i, j, at: i },
-                        out,
-                    );
-                }
-            }
+        for side in [0, 2, 3, 1] {
+            self.settle_side(surface, patch, rates, side, [[i0, i1], [j0, j1]], out);
         }
-        for (side, at, end, i) in [(3, i0, 0, 0), (1, i1, rates.n_u, n_i - 1)] {
-            if at == end {
-                for j in 0..n_j {
-                    self.settle(
-                        surface,
-                        patch,
-                        rates,
-                        BorderVertex { side, n: rates.n_v, along: j0, i, j, at: j },
-                        out,
-                    );
-                }
-            }
+    }
+
+    /// Makes the vertices of a side what both of its patches agree on, if the part `cells` (along u and v) touches that side.
+    fn settle_side(
+        &mut self,
+        surface: &Surface,
+        patch: PatchId,
+        rates: &PatchRates,
+        side: usize,
+        cells: [[u32; 2]; 2],
+        out: &mut LatticeGrid,
+    ) {
+        let (axis, is_far) = (side % 2, side == 1 || side == 2);
+        let n = [rates.n_u, rates.n_v];
+        let ([first, last], [near, far]) = (cells[axis], cells[1 - axis]);
+        let is_touched = if is_far { far == n[1 - axis] } else { near == 0 };
+        if !is_touched {
+            return;
+        }
+        let across = if is_far { (far - near) as usize } else { 0 };
+        for index in first..=last {
+            let along = (index - first) as usize;
+            let place = if axis == 0 { [along, across] } else { [across, along] };
+            self.settle(surface, patch, rates, SidePoint { side, index, rate: n[axis] }, place, out);
         }
     }
 
     /// Makes a border vertex what both sides agree on: a point of the edge, and its owner's rounding where theirs could
-    /// differ.
+    /// differ. `vertex` counts in cells of the grid, `place` is where it stands in `out`.
     #[inline]
     fn settle(
         &mut self,
         surface: &Surface,
         patch: PatchId,
         rates: &PatchRates,
-        b: BorderVertex,
+        vertex: SidePoint,
+        [i, j]: [usize; 2],
         out: &mut LatticeGrid,
     ) {
-        let rate = rates.sides[b.side];
-        let index = b.along + b.at as u32;
-        if rate == b.n {
-            if out.is_near(b.i, b.j) {
-                let at = SidePoint { side: b.side, index, rate };
-                out.set(b.i, b.j, self.owner.side_point(surface, patch, rates, at));
-            }
-            return;
+        let rate = rates.sides[vertex.side];
+        if rate != vertex.rate {
+            let at = SidePoint { index: snapped(vertex.index, vertex.rate, rate), rate, ..vertex };
+            out.set(i, j, self.snapped_vertex(surface, patch, rates, at));
+        } else if out.is_near(i, j) {
+            out.set(i, j, self.owner.side_point(surface, patch, rates, vertex));
         }
-        out.set(
-            b.i,
-            b.j,
-            self.snapped_vertex(
-                surface,
-                patch,
-                rates,
-                SidePoint { side: b.side, index: snapped(index, b.n, rate), rate },
-            ),
-        );
     }
 
     /// The vertex at a point of a side that has fewer segments than the grid.
