@@ -1,7 +1,6 @@
 //! `lazytess info`: what a scene would need, before it is rendered.
 
 use super::input::{load_scene, settle_rates};
-use super::job::RenderScene;
 use super::picture::PictureArgs;
 use super::run_options::RunArgs;
 use super::stdout;
@@ -47,13 +46,7 @@ impl InfoArgs {
         let mut scene = load_scene(&self.input)?;
         settle_rates(&mut scene, self.picture.rate);
         let settings = self.picture.settings(&scene, Vec::new())?;
-        let render = RenderScene {
-            scene: &scene,
-            camera: self.picture.camera,
-            settings: &settings,
-            edits: self.picture.edits,
-            memory: None,
-        };
+        let render = self.picture.of_scene(&scene, &settings);
         let mut inventory = Inventory { input: self.input.display().to_string(), ..Default::default() };
         let threads = RunArgs::available_threads();
         let meshes = render.read_meshes(threads, false)?;

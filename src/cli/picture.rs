@@ -3,6 +3,7 @@
 use super::PICTURE;
 use super::camera::CameraArgs;
 use super::input::EditArgs;
+use super::job::RenderScene;
 use super::values::{count, crop, display_units, picture_size};
 use crate::error::{Error, Result};
 use crate::render::{Aov, Groups, PixelRect, RenderSettings};
@@ -53,6 +54,11 @@ pub struct PictureArgs {
 impl PictureArgs {
     /// Samples per pixel when nobody says: the fewest that smooth edges.
     const DEFAULT_SPP: u32 = 4;
+
+    /// The picture of a scene, without a limit on memory. `settings` are [`Self::settings`].
+    pub fn of_scene<'a>(&self, scene: &'a SceneDescription, settings: &'a RenderSettings) -> RenderScene<'a> {
+        RenderScene { scene, camera: self.camera, settings, edits: self.edits, memory: None }
+    }
 
     /// What to render, with the scene's defaults where nothing was typed.
     pub fn settings(&self, scene: &SceneDescription, aovs: Vec<Aov>) -> Result<RenderSettings> {

@@ -2,7 +2,6 @@
 
 use super::input::{load_scene, settle_rates};
 use super::interrupt::cancel_on_interrupt;
-use super::job::RenderScene;
 use super::picture::PictureArgs;
 use super::run_options::RunArgs;
 use super::stdout;
@@ -66,13 +65,7 @@ impl TuneArgs {
         let settings = self.picture.settings(&scene, Vec::new())?;
         let cancel = cancel_on_interrupt()?;
         let (threads, quiet) = (self.run.threads(), self.run.quiet);
-        let render = RenderScene {
-            scene: &scene,
-            camera: self.picture.camera,
-            settings: &settings,
-            edits: self.picture.edits,
-            memory: None,
-        };
+        let render = self.picture.of_scene(&scene, &settings);
         let prepared = render.prepare(threads, quiet)?;
         let size = self.run.cache();
         let mut cache = prepared.cache(size, threads)?;
