@@ -23,16 +23,12 @@ pub fn for_ranges(n: usize, n_threads: usize, work: impl Fn(Range<usize>) + Sync
 /// Calls `work` with every item and its index, in no particular order, on at most `n_threads` threads.
 pub fn for_each<T: Sync>(items: &[T], n_threads: usize, work: impl Fn(usize, &T) + Sync) {
     let next = AtomicUsize::new(0);
-    let worker = || {
-        while let Some((i, item)) = nth(items, next.fetch_add(1, Ordering::Relaxed)) {
-            work(i, item);
-        }
+    let worker = || loop {
+        let i = next.fetch_add(1, Ordering::Relaxed);
+        let Some(item) = items.get(i) else { break };
+        work(i, item);
     };
     on_threads(n_threads.min(items.len()), worker);
-}
-
-fn nth<T>(items: &[T], i: usize) -> Option<(usize, &T)> {
-    items.get(i).map(|item| (i, item))
 }
 
 fn on_threads(n_threads: usize, worker: impl Fn() + Sync) {

@@ -15,7 +15,8 @@
 //! 1. Interpolation has no access to a tracer: an interpolated pixel touches no grid.
 //! 2. A tile depends on nothing but the scene, the camera and the settings; tiles lie at multiples of 64 pixels, whatever
 //!    the window. So neither threads nor a crop change a pixel.
-//! 3. A pixel that is not interpolated has, bit for bit, the colour that it has without groups.
+//! 3. A pixel that is not interpolated has, bit for bit, the colour that it has without groups; but where pixels have several
+//!    samples, one that looks like its neighbours after the first sample keeps that one alone.
 //!
 //! Ke, "Feature Adaptive Ray Tracing of Subdivision Surfaces", 2017, chapter 5.3 (groups); Akimoto et al., "Pixel-selected
 //! ray tracing", 1991 (refinement by prediction).
