@@ -130,7 +130,7 @@ pub struct Recorder<'t> {
 impl Recorder<'_> {
     /// Notes an access to the block of a root slot. `name` is one number for the table and the slot.
     #[inline]
-    pub fn root(&mut self, name: u64, block: &Block<'_>) {
+    pub fn root(&mut self, name: u64, block: Block<'_>) {
         let key = hash(name);
         self.is_kept = key < self.first_left_out;
         if self.is_kept {
@@ -146,13 +146,13 @@ impl Recorder<'_> {
     /// # Panics
     /// If `level` is 0 or 8 and more.
     #[inline]
-    pub fn child(&mut self, level: usize, child: usize, block: &Block<'_>) {
+    pub fn child(&mut self, level: usize, child: usize, block: Block<'_>) {
         if self.is_kept {
             self.push(hash(self.keys[level - 1].wrapping_add((child as u64 + 1) << KEY_BITS)), level, block);
         }
     }
 
-    fn push(&mut self, key: u64, level: usize, block: &Block<'_>) {
+    fn push(&mut self, key: u64, level: usize, block: Block<'_>) {
         self.keys[level] = key;
         let lines = super::memory::lines_for(block.bytes().len()) + block.n_children() / WORDS_PER_LINE;
         self.batch.push(Access::new(key, level, lines));

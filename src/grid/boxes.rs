@@ -1,6 +1,6 @@
 //! The head that pieces and nodes share: sixteen 8-bit boxes relative to one corner, and the test of a ray against them.
 
-use super::LatticeRay;
+use super::{LatticeRay, Plane};
 use crate::math::simd::Kernel;
 use bytemuck::{Pod, Zeroable};
 
@@ -165,8 +165,8 @@ struct Slabs {
     step: [f32; 3],
     near: [f32; 3],
     far: [f32; 3],
-    /// Index into `Head::planes`.
-    near_plane: [usize; 3],
+    near_planes: [Plane; 3],
+    far_planes: [Plane; 3],
 }
 
 impl Slabs {
@@ -177,7 +177,8 @@ impl Slabs {
             step: std::array::from_fn(|k| f32::from_bits((127 + u32::from(head.exponent[k])) << 23) * ray.inv[k]),
             near: std::array::from_fn(|k| (base[k] - ray.near_origin[k]) * ray.inv[k]),
             far: std::array::from_fn(|k| (base[k] - ray.far_origin[k]) * ray.inv[k]),
-            near_plane: std::array::from_fn(|k| k + 3 * ray.is_negative[k]),
+            near_planes: ray.near_planes,
+            far_planes: ray.far_planes,
         }
     }
 
@@ -186,9 +187,9 @@ impl Slabs {
     fn test<K: Kernel>(&self, kernel: K, head: &Head, first: usize, t_max: f32) -> (u32, [f32; 8]) {
         let (mut enter, mut leave) = (kernel.splat(0.0), kernel.splat(t_max));
         for k in 0..3 {
-            let (near, step) = (self.near_plane[k], kernel.splat(self.step[k]));
-            enter = kernel.max(plane_t(kernel, head, near, first, step, self.near[k]), enter);
-            leave = kernel.min(plane_t(kernel, head, (near + 3) % 6, first, step, self.far[k]), leave);
+            let step = kernel.splat(self.step[k]);
+            enter = kernel.max(plane_t(kernel, head, self.near_planes[k], first, step, self.near[k]), enter);
+            leave = kernel.min(plane_t(kernel, head, self.far_planes[k], first, step, self.far[k]), leave);
         }
         (kernel.le(enter, leave), kernel.store(enter))
     }
@@ -196,8 +197,8 @@ impl Slabs {
 
 /// t of one plane of the eight lanes from `first`.
 #[inline(always)]
-fn plane_t<K: Kernel>(k: K, head: &Head, plane: usize, first: usize, step: K::F, offset: f32) -> K::F {
-    let q: &[u8; 8] = head.planes[plane][first..first + 8].try_into().expect("eight lanes");
+fn plane_t<K: Kernel>(k: K, head: &Head, plane: Plane, first: usize, step: K::F, offset: f32) -> K::F {
+    let q: &[u8; 8] = head.planes[plane as usize][first..first + 8].try_into().expect("eight lanes");
     k.add(k.mul(k.widen(q), step), k.splat(offset))
 }
 

@@ -1,7 +1,7 @@
 //! Triangles by number, and what a ray hit.
 
 use crate::ids::PatchId;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, IVec3, Vec3};
 
 /// One triangle of a mesh: patch, cell (i, j) and half, in one word whose order is that of (patch, j, i, half).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -56,13 +56,23 @@ pub struct LatticeHit {
     pub grid: [u16; 2],
     /// The triangle's corners: lattice points, which f32 holds exactly.
     pub corners: [Vec3; 3],
+    /// Cross product of the triangle's edges, in lattice units squared, along du x dv: exact, zero for one without area. Kept with
+    /// the corners, since reading them back at once would wait for their stores.
+    pub normal: DVec3,
 }
 
 impl LatticeHit {
     /// No hit yet; hits beyond `t_max` will not be taken.
     #[inline(always)]
     pub fn none(t_max: f32) -> Self {
-        Self { t: t_max, triangle: TriangleId::NONE, barycentrics: [0.0; 2], grid: [1; 2], corners: [Vec3::ZERO; 3] }
+        Self {
+            t: t_max,
+            triangle: TriangleId::NONE,
+            barycentrics: [0.0; 2],
+            grid: [1; 2],
+            corners: [Vec3::ZERO; 3],
+            normal: DVec3::ZERO,
+        }
     }
 
     /// Whether something was hit.
@@ -71,14 +81,15 @@ impl LatticeHit {
         self.triangle != TriangleId::NONE
     }
 
-    /// Cross product of the triangle's edges, in lattice units squared, along du x dv. Zero for a triangle without area,
-    /// which can still be hit: it fills the crack between its neighbours.
+    /// Cross product of a triangle's edges. Zero for a triangle without area, which can still be hit: it fills the crack
+    /// between its neighbours.
     ///
     /// Exact, slivers included: edges are whole numbers below 2^25, products below 2^50, and f64 holds their differences.
-    #[inline]
-    pub fn normal(&self) -> DVec3 {
-        let [a, b, c] = self.corners.map(|corner| corner.as_dvec3());
-        (b - a).cross(c - a)
+    #[inline(always)]
+    pub(super) fn normal_of(corners: [IVec3; 3]) -> DVec3 {
+        let [a, b, c] = corners;
+        let (e, f) = ((b - a).as_dvec3(), (c - a).as_dvec3());
+        e.cross(f)
     }
 
     /// Place of the hit in the grid, in cells from corner 0 of the patch: (u n_u, v n_v).

@@ -37,7 +37,7 @@ pub use boxes::{CellRect, HEAD_BYTES, LaneHits, lane_mask};
 pub use hit::{LatticeHit, TriangleId};
 pub use node::{NODE_BYTES, NodeView, encode_node, is_node};
 pub use piece::{MAX_CELLS, PieceLayout, PieceView, VertexFormat};
-pub use ray::{LATTICE_LIMIT, LatticeRay};
+pub use ray::{LATTICE_LIMIT, LatticeRay, Plane};
 
 #[cfg(test)]
 mod tests;

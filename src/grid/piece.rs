@@ -245,13 +245,20 @@ impl<'b> PieceView<'b> {
     }
 
     #[inline(always)]
-    fn read<const BYTES: usize>(&self, i: usize, j: usize) -> [i32; 3] {
-        std::array::from_fn(|k| {
-            let at = self.row_start(j, k) + BYTES * i;
-            let mut word = [0; 4];
-            word[..BYTES].copy_from_slice(&self.bytes[at..at + BYTES]);
-            self.head.base[k] + i32::from_le_bytes(word)
-        })
+    pub(super) fn read<const BYTES: usize>(&self, i: usize, j: usize) -> [i32; 3] {
+        [self.coordinate::<BYTES>(i, j, 0), self.coordinate::<BYTES>(i, j, 1), self.coordinate::<BYTES>(i, j, 2)]
+    }
+
+    #[inline(always)]
+    fn coordinate<const BYTES: usize>(&self, i: usize, j: usize, axis: usize) -> i32 {
+        let at = self.row_start(j, axis) + BYTES * i;
+        let bytes = &self.bytes[at..at + BYTES];
+        let offset = match BYTES {
+            2 => i32::from(u16::from_le_bytes([bytes[0], bytes[1]])),
+            3 => i32::from_le_bytes([bytes[0], bytes[1], bytes[2], 0]),
+            _ => i32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
+        };
+        self.head.base[axis] + offset
     }
 
     /// Where the coordinates `axis` of row `j` begin.

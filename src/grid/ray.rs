@@ -12,6 +12,50 @@ const SLACK: f32 = 20.0 / 16_777_216.0;
 /// Rays that start outside the cube of this half-width are first moved up to it, in f64.
 const START_LIMIT: f64 = 33_554_432.0;
 
+/// Components of a scaled direction below this, 2^-64, count as zero.
+const DUST: f64 = 5.421_010_862_427_522e-20;
+
+/// Direction components between this and its reciprocal, 2^400, are made ready without looking at special cases.
+const GREATEST_ORDINARY: f64 = f64::from_bits((1023 + 400) << 52);
+
+/// A plane of a box, as an index: low x, y, z, then high x, y, z. (A type of its own, so that indexing six planes needs no check.)
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(usize)]
+pub enum Plane {
+    /// Least x.
+    LowX,
+    /// Least y.
+    LowY,
+    /// Least z.
+    LowZ,
+    /// Greatest x.
+    HighX,
+    /// Greatest y.
+    HighY,
+    /// Greatest z.
+    HighZ,
+}
+
+impl Plane {
+    /// Planes where a ray enters, by the signs of its direction: bit k is set where it is negative along axis k.
+    const NEAR: [[Self; 3]; 8] = Self::sides_by_signs([Self::LowX, Self::LowY, Self::LowZ], Self::HIGH);
+    /// Planes where it leaves.
+    const FAR: [[Self; 3]; 8] = Self::sides_by_signs(Self::HIGH, [Self::LowX, Self::LowY, Self::LowZ]);
+    const HIGH: [Self; 3] = [Self::HighX, Self::HighY, Self::HighZ];
+
+    const fn sides_by_signs(positive: [Self; 3], negative: [Self; 3]) -> [[Self; 3]; 8] {
+        let mut table = [positive; 8];
+        let mut i = 0;
+        while i < 24 {
+            if (i / 3) >> (i % 3) & 1 == 1 {
+                table[i / 3][i % 3] = negative[i % 3];
+            }
+            i += 1;
+        }
+        table
+    }
+}
+
 /// A ray in lattice space.
 ///
 /// The direction is scaled by a power of two, so that its largest component is in [1, 2]: `t` inside lattice space counts in units of
@@ -51,8 +95,10 @@ pub struct LatticeRay {
     pub(crate) far_origin: [f32; 3],
     /// 1 / direction, finite.
     pub(crate) inv: [f32; 3],
-    /// 1 where the direction is negative, or -0.
-    pub(crate) is_negative: [usize; 3],
+    /// The planes of a box where the ray enters, for x, y and z: low ones where the direction is positive.
+    pub(crate) near_planes: [Plane; 3],
+    /// The planes where it leaves.
+    pub(crate) far_planes: [Plane; 3],
     /// Axes (x, y, z of the sheared space): z is that of the largest component; x and y are swapped if that is negative, which keeps the winding.
     pub(crate) axes: [usize; 3],
     /// Woop's shear: d_x/d_z, d_y/d_z, 1/d_z.
@@ -72,34 +118,43 @@ impl LatticeRay {
     /// The direction may have any length. If it is zero, or anything is not finite (but for `t_max`), the ray hits nothing.
     #[inline(always)]
     pub fn new(origin: DVec3, direction: DVec3, t_max: f32, skip: TriangleId) -> Self {
-        let largest = direction.abs().max_element();
-        let is_valid = largest > 0.0 && direction.is_finite() && origin.is_finite() && t_max >= 0.0;
-        let (origin, direction, largest) =
-            if is_valid { (origin, direction, largest) } else { (DVec3::ZERO, DVec3::X, 1.0) };
-        let t_unit = power_of_two_below(largest).recip();
-        let scaled = direction * t_unit;
-        let t_start = if is_valid { start(origin, scaled) } else { None };
-        let t_end = t_start.map_or(-1.0, |t_start| (f64::from(t_max) / t_unit - t_start) as f32);
-        let t_start = t_start.unwrap_or(0.0);
-        Self::from_start(origin + t_start * scaled, scaled, t_end, skip, t_start, t_unit)
+        let magnitude = direction.abs();
+        let largest = magnitude.max_element();
+        let is_ordinary = magnitude.cmpge(DVec3::splat((largest * (2.0 * DUST)).max(1.0 / GREATEST_ORDINARY))).all()
+            && largest <= GREATEST_ORDINARY
+            && origin.abs().cmple(DVec3::splat(START_LIMIT)).all()
+            && t_max >= 0.0;
+        // The start is chosen, not the ray: so the ray is written where it stays, once.
+        let start = if is_ordinary {
+            let unit = power_of_two_below(largest);
+            let t_unit = reciprocal_of_power(unit);
+            let direction = (direction * t_unit).as_vec3().to_array();
+            let inv = [1.0 / direction[0], 1.0 / direction[1], 1.0 / direction[2]];
+            Start { origin, direction, inv, t_max: (f64::from(t_max) * unit) as f32, t_start: 0.0, t_unit }
+        } else {
+            Start::at_the_extremes(origin, direction, t_max)
+        };
+        Self::from_start(start, skip)
     }
 
     #[inline(always)]
-    fn from_start(start: DVec3, scaled: DVec3, t_max: f32, skip: TriangleId, t_start: f64, t_unit: f64) -> Self {
-        let direction = [without_dust(scaled.x), without_dust(scaled.y), without_dust(scaled.z)];
+    fn from_start(start: Start, skip: TriangleId) -> Self {
+        let Start { origin: start, direction, inv, t_max, t_start, t_unit } = start;
         let [(cell_x, x), (cell_y, y), (cell_z, z)] = [split(start.x), split(start.y), split(start.z)];
         let origin = start.as_vec3();
         let slack = (origin.abs().max_element() + LATTICE_LIMIT) * SLACK;
         let forward = [slack.copysign(direction[0]), slack.copysign(direction[1]), slack.copysign(direction[2])];
-        let axes = shear_axes(direction);
+        let signs = is_negative(direction[0]) | is_negative(direction[1]) << 1 | is_negative(direction[2]) << 2;
+        let axes = shear_axes(direction, signs);
         let [dx, dy, dz] = [direction[axes[0]], direction[axes[1]], direction[axes[2]]];
         Self {
             cell: [cell_x, cell_y, cell_z],
             fraction: [x, y, z],
             near_origin: [origin.x + forward[0], origin.y + forward[1], origin.z + forward[2]],
             far_origin: [origin.x - forward[0], origin.y - forward[1], origin.z - forward[2]],
-            inv: [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])],
-            is_negative: [is_negative(direction[0]), is_negative(direction[1]), is_negative(direction[2])],
+            inv,
+            near_planes: Plane::NEAR[signs],
+            far_planes: Plane::FAR[signs],
             axes,
             shear: [dx / dz, dy / dz, 1.0 / dz],
             t_max,
@@ -135,10 +190,52 @@ impl LatticeRay {
     }
 }
 
+/// Where a ray starts and how it counts t.
+struct Start {
+    origin: DVec3,
+    /// Scaled.
+    direction: [f32; 3],
+    inv: [f32; 3],
+    t_max: f32,
+    t_start: f64,
+    t_unit: f64,
+}
+
+impl Start {
+    /// Whatever the numbers are.
+    #[cold]
+    #[inline(never)]
+    fn at_the_extremes(origin: DVec3, direction: DVec3, t_max: f32) -> Self {
+        let largest = direction.abs().max_element();
+        let is_valid = largest > 0.0 && direction.is_finite() && origin.is_finite() && t_max >= 0.0;
+        let (origin, direction, largest) =
+            if is_valid { (origin, direction, largest) } else { (DVec3::ZERO, DVec3::X, 1.0) };
+        let t_unit = power_of_two_below(largest).recip();
+        let scaled = direction * t_unit;
+        let t_start = if is_valid { start(origin, scaled) } else { None };
+        let t_max = t_start.map_or(-1.0, |t_start| (f64::from(t_max) / t_unit - t_start) as f32);
+        let t_start = t_start.unwrap_or(0.0);
+        let direction = [without_dust(scaled.x), without_dust(scaled.y), without_dust(scaled.z)];
+        Self { origin: origin + t_start * scaled, direction, inv: direction.map(inverse), t_max, t_start, t_unit }
+    }
+}
+
 /// The power of two p with p <= x < 2p, for a positive normal x; the smallest normal number for a subnormal one.
 #[inline(always)]
 fn power_of_two_below(x: f64) -> f64 {
     f64::from_bits(x.to_bits() & 0x7ff0_0000_0000_0000).max(f64::MIN_POSITIVE)
+}
+
+/// 1 / p for a power of two between 2^-1022 and 2^1021, without dividing.
+#[inline(always)]
+fn reciprocal_of_power(p: f64) -> f64 {
+    const TWICE_THE_BIAS: u64 = 2046 << 52;
+    f64::from_bits(TWICE_THE_BIAS - p.to_bits())
+}
+
+#[inline(always)]
+fn is_negative(d: f32) -> usize {
+    (d.to_bits() >> 31) as usize
 }
 
 /// The whole number nearest to a coordinate (one of two at ties), and what is left, exact in f64 and rounded to f32.
@@ -157,15 +254,9 @@ fn inverse(d: f32) -> f32 {
     if d == 0.0 { GREATEST.copysign(d) } else { 1.0 / d }
 }
 
-#[inline(always)]
-fn is_negative(d: f32) -> usize {
-    (d.to_bits() >> 31) as usize
-}
-
 /// Rounded to f32, with the sign of the zero kept, and zero below 2^-64.
 #[inline(always)]
 fn without_dust(d: f64) -> f32 {
-    const DUST: f64 = 5.421_010_862_427_522e-20;
     if d.abs() < DUST { 0.0f32.copysign(d as f32) } else { d as f32 }
 }
 
@@ -190,17 +281,15 @@ fn start_at_cube(origin: DVec3, direction: DVec3) -> Option<f64> {
     (enter <= leave).then_some(enter)
 }
 
-/// The axes x, y, z of the sheared space for a direction.
+/// The axes x, y, z of the sheared space for a direction whose signs are as in [`Plane::NEAR`].
 #[inline(always)]
-fn shear_axes(direction: [f32; 3]) -> [usize; 3] {
+fn shear_axes(direction: [f32; 3], signs: usize) -> [usize; 3] {
+    /// By the axis of the largest component, and whether that is negative.
+    const AXES: [[[usize; 3]; 2]; 3] = [[[1, 2, 0], [2, 1, 0]], [[2, 0, 1], [0, 2, 1]], [[0, 1, 2], [1, 0, 2]]];
+    /// The axis, by x >= y, x >= z and y >= z.
+    const LARGEST: [u8; 8] = [2, 2, 2, 0, 1, 1, 1, 0];
     let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
-    let axis = if x >= y && x >= z {
-        0
-    } else if y >= z {
-        1
-    } else {
-        2
-    };
-    let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
-    if direction[axis] < 0.0 { [last, next, axis] } else { [next, last, axis] }
+    let order = usize::from(x >= y) | usize::from(x >= z) << 1 | usize::from(y >= z) << 2;
+    let axis = usize::from(LARGEST[order]);
+    AXES[axis % 3][signs >> axis & 1]
 }

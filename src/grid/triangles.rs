@@ -5,7 +5,7 @@ use super::boxes::{HEAD_BYTES, LaneHits};
 use super::{LatticeHit, LatticeRay, PieceView, TriangleId};
 use crate::ids::PatchId;
 use crate::math::simd::Kernel;
-use glam::{IVec3, Vec3};
+use glam::IVec3;
 
 impl PieceView<'_> {
     /// Takes the nearest hit of the piece into `hit` if it is nearer than what is there, or as near and the smaller triangle.
@@ -27,7 +27,9 @@ impl PieceView<'_> {
         }
         let is_nearer = hit.triangle != before;
         if is_nearer {
-            hit.corners = self.corners(hit.triangle);
+            let corners = self.corners(hit.triangle);
+            hit.corners = [corners[0].as_vec3(), corners[1].as_vec3(), corners[2].as_vec3()];
+            hit.normal = LatticeHit::normal_of(corners);
             hit.grid = self.head.grid;
         }
         is_nearer
@@ -85,12 +87,22 @@ impl PieceView<'_> {
 
     /// The corners of a triangle of this piece.
     #[inline(always)]
-    fn corners(&self, triangle: TriangleId) -> [Vec3; 3] {
+    fn corners(&self, triangle: TriangleId) -> [IVec3; 3] {
         let i = (triangle.i() - u32::from(self.head.cells.i0)) as usize;
         let j = (triangle.j() - u32::from(self.head.cells.j0)) as usize;
-        let half = triangle.half() as usize;
-        let corner = |i, j| IVec3::from_array(self.vertex(i, j)).as_vec3();
-        [corner(i + half, j + half), corner(i + 1 - half, j + half), corner(i + half, j + 1 - half)]
+        match (self.head.format, triangle.half() as usize) {
+            (2, half) => self.corners_of::<2>(i, j, half),
+            (3, half) => self.corners_of::<3>(i, j, half),
+            (_, half) => self.corners_of::<4>(i, j, half),
+        }
+    }
+
+    #[inline(always)]
+    fn corners_of<const BYTES: usize>(&self, i: usize, j: usize, half: usize) -> [IVec3; 3] {
+        let first = self.read::<BYTES>(i + half, j + half);
+        let second = self.read::<BYTES>(i + 1 - half, j + half);
+        let third = self.read::<BYTES>(i + half, j + 1 - half);
+        [IVec3::from_array(first), IVec3::from_array(second), IVec3::from_array(third)]
     }
 }
 

@@ -14,7 +14,7 @@ use crate::grid::{
 };
 use crate::ids::{MeshId, PatchId};
 use crate::math::LatticeGrid;
-use crate::math::simd::{self, Kernel, Task};
+use crate::math::simd::{self, Best, Kernel, Task};
 use crate::math::{Bounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
 use crate::subdiv::{Dicer, PatchRates};
 use glam::DVec3;
@@ -34,6 +34,7 @@ pub struct Intersector<'w> {
     /// Remembers other patches than the builder's: those that shading asks about.
     shading: Dicer,
     stacks: Stacks,
+    kernel: Best,
 }
 
 /// What building a block needs.
@@ -86,27 +87,6 @@ fn child_cells(parent: CellRect, side: u32, a: u32, b: u32) -> CellRect {
 }
 
 impl Builder<'_> {
-    /// The block of child `lane` of a node, built if it is missing.
-    #[inline(always)]
-    fn fetch_child<'v>(
-        &mut self,
-        visit: &'v Visit<'_>,
-        of: PatchContext<'_>,
-        node: &Level<'v>,
-        lane: usize,
-        level: usize,
-    ) -> Block<'v> {
-        let (slot, cells) = node.child(lane);
-        let block = match visit.get(slot) {
-            Some(block) => block,
-            None => self.build(visit, slot, of, Some(cells)),
-        };
-        if let Some(recorder) = &mut self.recorder {
-            recorder.child(level, lane, &block);
-        }
-        block
-    }
-
     /// Builds the block over these cells, or over the whole patch.
     #[cold]
     #[inline(never)]
@@ -164,9 +144,10 @@ impl Builder<'_> {
         [n_u as u8, n_v as u8]
     }
 
-    /// The first block of a patch.
-    #[inline(always)]
-    fn fetch_root<'v>(
+    /// Builds the first block of a patch.
+    #[cold]
+    #[inline(never)]
+    fn build_root<'v>(
         &mut self,
         visit: &'v Visit<'_>,
         slot: Slot<'v>,
@@ -174,17 +155,22 @@ impl Builder<'_> {
         cache: &GridCache,
         leaf_slot: u32,
     ) -> Block<'v> {
-        let block = match visit.get(slot) {
-            Some(block) => block,
-            None => {
-                cache.touch(of.id, leaf_slot);
-                self.build(visit, slot, of, None)
-            }
-        };
+        cache.touch(of.id, leaf_slot);
+        self.build(visit, slot, of, None)
+    }
+
+    #[inline(always)]
+    fn note_root(&mut self, of: PatchContext<'_>, leaf_slot: u32, block: Block<'_>) {
         if let Some(recorder) = &mut self.recorder {
-            recorder.root(name_of(of.id, leaf_slot), &block);
+            recorder.root(name_of(of.id, leaf_slot), block);
         }
-        block
+    }
+
+    #[inline(always)]
+    fn note_child(&mut self, level: usize, lane: usize, block: Block<'_>) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.child(level, lane, block);
+        }
     }
 }
 
@@ -225,6 +211,16 @@ impl<'v> Level<'v> {
     }
 }
 
+/// The ray as the mesh's lattice sees it. `t` keeps its meaning.
+#[inline(always)]
+fn lattice_ray([origin, direction]: [DVec3; 2], id: MeshId, ray: &Ray, t_max: f32) -> LatticeRay {
+    let skip = match ray.from {
+        Some(from) if from.mesh == id => triangle_id(&from),
+        _ => TriangleId::NONE,
+    };
+    LatticeRay::new(origin, direction, t_max, skip)
+}
+
 struct ClosestInMesh<'a, 'w> {
     tracer: &'a mut Intersector<'w>,
     mesh: MeshId,
@@ -233,76 +229,79 @@ struct ClosestInMesh<'a, 'w> {
 }
 
 impl Task for ClosestInMesh<'_, '_> {
-    /// The hit, and its distance as the caller counts it.
-    type Output = Option<(LatticeHit, f32)>;
+    type Output = Option<Hit>;
 
     #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> Self::Output {
+    fn run<K: Kernel>(self, kernel: K) -> Option<Hit> {
         let Self { tracer, mesh: id, ray, t_max } = self;
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
-        let ray = &lattice_ray(mesh, id, ray, t_max)?;
+        let entering = mesh.entrance().ray_in_reach(kernel, ray)?;
+        let ray = &lattice_ray(entering, id, ray, t_max);
         let hit = &mut LatticeHit::none(ray.t_max());
         let table = cache.table(id);
-        let visit = pin.visit();
+        let visit = &pin.visit();
         let mut walk = mesh.top().walk(&mut stacks.mesh);
         while let Some(leaf) = walk.nearest(kernel, ray, hit.t, |slot| visit.prefetch(visit.root(table, SlotId(slot))))
         {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
-            let root = builder.fetch_root(&visit, slot, of, cache, leaf.slot);
-            closest_in_patch(kernel, builder, &visit, root, of, ray, hit);
-        }
-        hit.is_some().then(|| (*hit, ray.caller_t(hit.t)))
-    }
-}
-
-/// The ray as the mesh's lattice sees it. `t` keeps its meaning. `None` if it misses the mesh's box.
-#[inline(always)]
-fn lattice_ray(mesh: &WorldMesh, id: MeshId, ray: &Ray, t_max: f32) -> Option<LatticeRay> {
-    let to = mesh.lattice_from_world();
-    let (origin, direction) = (to.transform_point3(ray.origin), to.transform_vector3(ray.direction));
-    if !mesh.is_in_reach(origin, direction) {
-        return None;
-    }
-    let skip = match ray.from {
-        Some(from) if from.mesh == id => triangle_id(&from),
-        _ => TriangleId::NONE,
-    };
-    Some(LatticeRay::new(origin, direction, t_max, skip))
-}
-
-#[inline(always)]
-fn closest_in_patch<K: Kernel>(
-    kernel: K,
-    builder: &mut Builder<'_>,
-    visit: &Visit<'_>,
-    root: Block<'_>,
-    of: PatchContext<'_>,
-    ray: &LatticeRay,
-    hit: &mut LatticeHit,
-) {
-    if !is_node(root.bytes()) {
-        PieceView::new(root.bytes()).closest(kernel, ray, of.patch, hit);
-        return;
-    }
-    let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
-    levels[0] = Some(Level::new(kernel, visit, root, ray, hit.t));
-    let mut depth = 0;
-    while let Some(level) = &mut levels[depth] {
-        let Some(lane) = level.hits.pop_nearest(hit.t) else {
-            if depth == 0 {
-                break;
+            if let Some(root) = visit.get(slot) {
+                builder.note_root(of, leaf.slot, root);
+                ClosestInPatch { builder, visit, root, of, ray, hit }.run(kernel);
+            } else {
+                // Apart, so that a block that is there stays in registers.
+                let root = builder.build_root(visit, slot, of, cache, leaf.slot);
+                builder.note_root(of, leaf.slot, root);
+                kernel.enter(ClosestInPatch { builder, visit, root, of, ray, hit });
             }
-            depth -= 1;
-            continue;
-        };
-        let block = builder.fetch_child(visit, of, level, lane, depth + 1);
-        if is_node(block.bytes()) {
-            depth += 1;
-            levels[depth] = Some(Level::new(kernel, visit, block, ray, hit.t));
-        } else {
-            PieceView::new(block.bytes()).closest(kernel, ray, of.patch, hit);
+        }
+        hit.is_some().then(|| hit_of(mesh, id, ray.caller_t(hit.t), hit))
+    }
+}
+
+struct ClosestInPatch<'a, 'v, 'p, 'w> {
+    builder: &'a mut Builder<'w>,
+    visit: &'v Visit<'p>,
+    root: Block<'v>,
+    of: PatchContext<'a>,
+    ray: &'a LatticeRay,
+    hit: &'a mut LatticeHit,
+}
+
+impl Task for ClosestInPatch<'_, '_, '_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) {
+        let Self { builder, visit, root, of, ray, hit } = self;
+        if !is_node(root.bytes()) {
+            PieceView::new(root.bytes()).closest(kernel, ray, of.patch, hit);
+            return;
+        }
+        let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
+        levels[0] = Some(Level::new(kernel, visit, root, ray, hit.t));
+        let mut depth = 0;
+        while let Some(level) = &mut levels[depth] {
+            let Some(lane) = level.hits.pop_nearest(hit.t) else {
+                if depth == 0 {
+                    break;
+                }
+                depth -= 1;
+                continue;
+            };
+            let (slot, cells) = level.child(lane);
+            let block = match visit.get(slot) {
+                Some(block) => block,
+                None => builder.build(visit, slot, of, Some(cells)),
+            };
+            builder.note_child(depth + 1, lane, block);
+            if is_node(block.bytes()) {
+                depth += 1;
+                levels[depth] = Some(Level::new(kernel, visit, block, ray, hit.t));
+            } else {
+                PieceView::new(block.bytes()).closest(kernel, ray, of.patch, hit);
+            }
         }
     }
 }
@@ -321,15 +320,23 @@ impl Task for OccludedInMesh<'_, '_> {
         let Self { tracer, mesh: id, ray } = self;
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
-        let Some(ray) = &lattice_ray(mesh, id, ray, ray.t_max) else { return false };
+        let Some(entering) = mesh.entrance().ray_in_reach(kernel, ray) else { return false };
+        let ray = &lattice_ray(entering, id, ray, ray.t_max);
         let table = cache.table(id);
-        let visit = pin.visit();
+        let visit = &pin.visit();
         let mut walk = mesh.top().walk(&mut stacks.mesh);
         while let Some(leaf) = walk.any(kernel, ray, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
-            let root = builder.fetch_root(&visit, slot, of, cache, leaf.slot);
-            if occluded_in_patch(kernel, builder, &visit, root, of, ray) {
+            let is_hit = if let Some(root) = visit.get(slot) {
+                builder.note_root(of, leaf.slot, root);
+                OccludedInPatch { builder, visit, root, of, ray }.run(kernel)
+            } else {
+                let root = builder.build_root(visit, slot, of, cache, leaf.slot);
+                builder.note_root(of, leaf.slot, root);
+                kernel.enter(OccludedInPatch { builder, visit, root, of, ray })
+            };
+            if is_hit {
                 return true;
             }
         }
@@ -337,38 +344,73 @@ impl Task for OccludedInMesh<'_, '_> {
     }
 }
 
-#[inline(always)]
-fn occluded_in_patch<K: Kernel>(
-    kernel: K,
-    builder: &mut Builder<'_>,
-    visit: &Visit<'_>,
-    root: Block<'_>,
-    of: PatchContext<'_>,
-    ray: &LatticeRay,
-) -> bool {
-    if !is_node(root.bytes()) {
-        return PieceView::new(root.bytes()).occluded(kernel, ray, of.patch);
-    }
-    let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
-    levels[0] = Some(Level::new(kernel, visit, root, ray, ray.t_max()));
-    let mut depth = 0;
-    while let Some(level) = &mut levels[depth] {
-        let Some(lane) = level.hits.pop() else {
-            if depth == 0 {
-                break;
-            }
-            depth -= 1;
-            continue;
-        };
-        let block = builder.fetch_child(visit, of, level, lane, depth + 1);
-        if is_node(block.bytes()) {
-            depth += 1;
-            levels[depth] = Some(Level::new(kernel, visit, block, ray, ray.t_max()));
-        } else if PieceView::new(block.bytes()).occluded(kernel, ray, of.patch) {
-            return true;
+struct OccludedInPatch<'a, 'v, 'p, 'w> {
+    builder: &'a mut Builder<'w>,
+    visit: &'v Visit<'p>,
+    root: Block<'v>,
+    of: PatchContext<'a>,
+    ray: &'a LatticeRay,
+}
+
+impl Task for OccludedInPatch<'_, '_, '_, '_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> bool {
+        let Self { builder, visit, root, of, ray } = self;
+        if !is_node(root.bytes()) {
+            return PieceView::new(root.bytes()).occluded(kernel, ray, of.patch);
         }
+        let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
+        levels[0] = Some(Level::new(kernel, visit, root, ray, ray.t_max()));
+        let mut depth = 0;
+        while let Some(level) = &mut levels[depth] {
+            let Some(lane) = level.hits.pop() else {
+                if depth == 0 {
+                    break;
+                }
+                depth -= 1;
+                continue;
+            };
+            let (slot, cells) = level.child(lane);
+            let block = match visit.get(slot) {
+                Some(block) => block,
+                None => builder.build(visit, slot, of, Some(cells)),
+            };
+            builder.note_child(depth + 1, lane, block);
+            if is_node(block.bytes()) {
+                depth += 1;
+                levels[depth] = Some(Level::new(kernel, visit, block, ray, ray.t_max()));
+            } else if PieceView::new(block.bytes()).occluded(kernel, ray, of.patch) {
+                return true;
+            }
+        }
+        false
     }
-    false
+}
+
+/// A hit as the caller sees it, at the caller's `t`.
+#[inline(always)]
+fn hit_of(mesh: &WorldMesh, id: MeshId, t: f32, found: &LatticeHit) -> Hit {
+    let patch = found.triangle.patch();
+    let [u, v] = found.in_cells();
+    let [n_u, n_v] = found.grid.map(f32::from);
+    let (face, sub) = mesh.surface().face_of(patch);
+    Hit {
+        t,
+        primitive: PrimitiveRef {
+            mesh: id,
+            patch,
+            cell: [found.triangle.i() as u16, found.triangle.j() as u16],
+            half: found.triangle.half() as u8,
+        },
+        face,
+        sub,
+        u: u / n_u,
+        v: v / n_v,
+        normal_in_object: found.normal * mesh.surface().lattice().step.powi(2),
+        on_triangle: OnTriangle { corners: found.corners, weights: found.barycentrics },
+    }
 }
 
 impl<'w> Intersector<'w> {
@@ -382,6 +424,7 @@ impl<'w> Intersector<'w> {
             builder: Builder { recorder: cache.trace().map(TraceLog::recorder), ..Default::default() },
             shading: Dicer::default(),
             stacks: Stacks::default(),
+            kernel: Best::detect(),
         }
     }
 
@@ -409,9 +452,10 @@ impl<'w> Intersector<'w> {
     #[inline]
     fn closest_in_mesh(&mut self, mesh: MeshId, ray: &Ray, best: &mut Option<Hit>) {
         let t_max = best.map_or(ray.t_max, |hit| hit.t);
-        let Some((found, t)) = simd::run(ClosestInMesh { tracer: self, mesh, ray, t_max }) else { return };
-        if best.is_none_or(|b| t < b.t || (t == b.t && mesh < b.primitive.mesh)) {
-            *best = Some(self.hit(mesh, t, &found));
+        let found = self.kernel.run(ClosestInMesh { tracer: self, mesh, ray, t_max });
+        let Some(hit) = found else { return };
+        if best.is_none_or(|b| hit.t < b.t || (hit.t == b.t && mesh < b.primitive.mesh)) {
+            *best = found;
         }
     }
 
@@ -420,29 +464,6 @@ impl<'w> Intersector<'w> {
         let to = self.world.scene_from_world();
         let (origin, direction) = (to.transform_point3(ray.origin), to.transform_vector3(ray.direction));
         LatticeRay::new(origin, direction, f32::INFINITY, TriangleId::NONE)
-    }
-
-    fn hit(&self, id: MeshId, t: f32, found: &LatticeHit) -> Hit {
-        let mesh = self.world.mesh(id);
-        let patch = found.triangle.patch();
-        let [u, v] = found.in_cells();
-        let [n_u, n_v] = found.grid.map(f32::from);
-        let (face, sub) = mesh.surface().face_of(patch);
-        Hit {
-            t,
-            primitive: PrimitiveRef {
-                mesh: id,
-                patch,
-                cell: [found.triangle.i() as u16, found.triangle.j() as u16],
-                half: found.triangle.half() as u8,
-            },
-            face,
-            sub,
-            u: u / n_u,
-            v: v / n_v,
-            normal_in_object: found.normal() * mesh.surface().lattice().step.powi(2),
-            on_triangle: OnTriangle { corners: found.corners, weights: found.barycentrics },
-        }
     }
 }
 
@@ -460,11 +481,10 @@ impl Drop for Intersector<'_> {
 
 impl Intersect for Intersector<'_> {
     fn closest(&mut self, ray: &Ray) -> Option<Hit> {
-        let mut best = None;
         if self.world.meshes().len() == 1 {
-            self.closest_in_mesh(MeshId(0), ray, &mut best);
-            return best;
+            return self.kernel.run(ClosestInMesh { tracer: self, mesh: MeshId(0), ray, t_max: ray.t_max });
         }
+        let mut best = None;
         let scene_ray = self.scene_ray(ray);
         let world = self.world;
         let mut stack = std::mem::take(&mut self.stacks.scene);
@@ -479,7 +499,7 @@ impl Intersect for Intersector<'_> {
     }
 
     fn occluded(&mut self, ray: &Ray) -> bool {
-        let occluded_by = |tracer: &mut Self, mesh: MeshId| simd::run(OccludedInMesh { tracer, mesh, ray });
+        let occluded_by = |tracer: &mut Self, mesh: MeshId| tracer.kernel.run(OccludedInMesh { tracer, mesh, ray });
         if self.world.meshes().len() == 1 {
             return occluded_by(self, MeshId(0));
         }

@@ -7,6 +7,7 @@ pub mod camera;
 pub mod compile;
 pub mod costs;
 pub mod description;
+mod entrance;
 pub mod intersect;
 pub mod light;
 pub mod material;

@@ -3,6 +3,7 @@
 use super::accel::{BUILD_BYTES_PER_PATCH, TopLevel};
 use super::costs::BuildCosts;
 use super::description::MeshDescription;
+use super::entrance::Entrance;
 use super::rate::DicingRate;
 use crate::cache::{CacheConfig, SegmentCache, SlotTable, TraceLog};
 use crate::error::{Error, Result};
@@ -68,8 +69,8 @@ pub struct WorldMesh {
     world_from_object_normal: DMat3,
     rate: DicingRate,
     bounds_in_world: DBounds,
-    /// The top level's box in lattice units, widened by more than a ray's rounding.
-    reach: DBounds,
+    /// Into the top level's box, widened by more than a ray's rounding.
+    entrance: Entrance,
 }
 
 /// What the full tessellation would take.
@@ -189,6 +190,7 @@ impl WorldMesh {
         let bounds = boxes.iter().fold(Bounds::EMPTY, |a, b| a.union(*b));
         let bounds_in_world = world_box(&surface, world_from_object, bounds);
         let reach = DBounds { min: bounds.min.as_dvec3(), max: bounds.max.as_dvec3() }.expanded(REACH_MARGIN);
+        let lattice_from_world = lattice_from_object * object_from_world;
         let top = TopLevel::build(&boxes, n_threads);
         progress(1.0);
         let visible = (patches.len() != surface.n_patches()).then_some(patches);
@@ -197,11 +199,11 @@ impl WorldMesh {
             visible,
             tex_coords,
             world_from_object,
-            lattice_from_world: lattice_from_object * object_from_world,
+            lattice_from_world,
             world_from_object_normal: linear.inverse().transpose() * linear.determinant().signum(),
             rate,
             bounds_in_world,
-            reach,
+            entrance: Entrance::new(&lattice_from_world, reach),
             surface,
         })
     }
@@ -277,18 +279,10 @@ impl WorldMesh {
         self.surface.patch_rates(patch, &|a, b| self.rate.edge_rate(world(a), world(b)))
     }
 
-    /// Whether a ray in lattice space may come near the mesh at all: a quick look before the ray is made ready for the tree.
+    /// What a ray at this mesh goes through first.
     #[inline(always)]
-    pub(super) fn is_in_reach(&self, origin: DVec3, direction: DVec3) -> bool {
-        let inverse = direction.recip();
-        let (a, b) = ((self.reach.min - origin) * inverse, (self.reach.max - origin) * inverse);
-        // f64's min and max pass over the NaN of a ray within a plane of the box.
-        let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
-        for k in 0..3 {
-            enter = enter.max(a[k].min(b[k]));
-            leave = leave.min(a[k].max(b[k]));
-        }
-        enter <= leave * (1.0 + 1e-9)
+    pub(super) fn entrance(&self) -> &Entrance {
+        &self.entrance
     }
 
     /// What [`new`](Self::new) will take for this mesh.

@@ -118,7 +118,7 @@ fn weights_and_normal_belong_to_the_triangle() {
             n_hits += 1;
             let [s, t] = hit.barycentrics;
             assert!((s - 0.2).abs() < 1e-4 && (t - 0.3).abs() < 1e-4, "{hit:?}");
-            assert_eq!(hit.normal(), normal);
+            assert_eq!(hit.normal, normal);
             let corner = [f64::from(id.i()), f64::from(id.j())];
             let expected = if id.half() == 0 { [0.2, 0.3] } else { [0.8, 0.7] };
             let in_cells = hit.in_cells().map(f64::from);

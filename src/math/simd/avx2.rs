@@ -19,13 +19,6 @@ impl Avx2 {
             && is_x86_feature_detected!("popcnt");
         here.then_some(Avx2(()))
     }
-
-    /// Does `task` in a function compiled for this kernel's instructions.
-    #[inline]
-    pub fn run<T: Task>(self, task: T) -> T::Output {
-        // SAFETY: `self` exists, so `detect` found every feature that `enter` is compiled for.
-        unsafe { enter(self, task) }
-    }
 }
 
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
@@ -135,6 +128,10 @@ impl Kernel for Avx2 {
         in_registers!(_mm256_mul_pd(a, b))
     }
     #[inline(always)]
+    fn div4(self, a: __m256d, b: __m256d) -> __m256d {
+        in_registers!(_mm256_div_pd(a, b))
+    }
+    #[inline(always)]
     fn min4(self, a: __m256d, b: __m256d) -> __m256d {
         in_registers!(_mm256_min_pd(a, b))
     }
@@ -183,6 +180,11 @@ impl Kernel for Avx2 {
             };
             _mm256_cvtepi32_ps(_mm256_add_epi32(integers, _mm256_set1_epi32(base)))
         }
+    }
+    #[inline(always)]
+    fn enter<T: Task>(self, task: T) -> T::Output {
+        // SAFETY: `self` exists, so `detect` found every feature that `enter` is compiled for.
+        unsafe { enter(self, task) }
     }
     #[inline(always)]
     fn prefetch<T>(self, x: *const T) {

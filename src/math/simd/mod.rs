@@ -69,6 +69,8 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn sub4(self, a: Self::D, b: Self::D) -> Self::D;
     /// Lanewise product.
     fn mul4(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Lanewise quotient.
+    fn div4(self, a: Self::D, b: Self::D) -> Self::D;
     /// Lanewise `if a < b { a } else { b }`.
     fn min4(self, a: Self::D, b: Self::D) -> Self::D;
     /// Lanewise `if a > b { a } else { b }`.
@@ -88,6 +90,9 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     /// `at[k] + 16 <= bytes.len()` for both k; for `BYTES` = 2, `at[k] + 8 <= bytes.len()` is enough.
     unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> Self::F;
 
+    /// Does `task` in a function compiled for this kernel's instructions: for code that must not be inlined into its caller.
+    fn enter<T: Task>(self, task: T) -> T::Output;
+
     /// Asks for the cache line of `x`, which may be any address.
     fn prefetch<T>(self, x: *const T);
 }
@@ -98,6 +103,38 @@ pub trait Task {
     type Output;
     /// Does the work.
     fn run<K: Kernel>(self, kernel: K) -> Self::Output;
+}
+
+/// The best kernel of this processor: looked for once, then used for many tasks.
+#[derive(Clone, Copy, Debug)]
+pub enum Best {
+    /// AVX2.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    /// Arrays.
+    Portable(Portable),
+}
+
+impl Best {
+    /// Looks what the processor has.
+    #[inline]
+    pub fn detect() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(kernel) = Avx2::detect() {
+            return Self::Avx2(kernel);
+        }
+        Self::Portable(Portable)
+    }
+
+    /// Does `task` with this kernel.
+    #[inline(always)]
+    pub fn run<T: Task>(self, task: T) -> T::Output {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(kernel) => kernel.enter(task),
+            Self::Portable(kernel) => kernel.enter(task),
+        }
+    }
 }
 
 /// Does `task` with the best kernel that this processor has.
@@ -117,11 +154,7 @@ pub trait Task {
 /// ```
 #[inline]
 pub fn run<T: Task>(task: T) -> T::Output {
-    #[cfg(target_arch = "x86_64")]
-    if let Some(kernel) = Avx2::detect() {
-        return kernel.run(task);
-    }
-    task.run(Portable)
+    Best::detect().run(task)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code)]
 
-use super::Kernel;
+use super::{Kernel, Task};
 use std::array::from_fn;
 
 /// Eight lanes as an array of floats.
@@ -109,6 +109,10 @@ impl Kernel for Portable {
         zip4(a, b, |a, b| a * b)
     }
     #[inline(always)]
+    fn div4(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        zip4(a, b, |a, b| a / b)
+    }
+    #[inline(always)]
     fn min4(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
         zip4(a, b, |a, b| if a < b { a } else { b })
     }
@@ -138,6 +142,10 @@ impl Kernel for Portable {
             word[..BYTES].copy_from_slice(&bytes[at..at + BYTES]);
             u32::from_le_bytes(word).wrapping_add_signed(base) as i32 as f32
         })
+    }
+    #[inline(always)]
+    fn enter<T: Task>(self, task: T) -> T::Output {
+        task.run(self)
     }
     #[inline(always)]
     fn prefetch<T>(self, _: *const T) {}

@@ -66,6 +66,7 @@ impl Task for RoundOfDoubles {
             k.add4(a, b),
             k.sub4(a, b),
             k.mul4(a, b),
+            k.div4(a, b),
             k.min4(a, b),
             k.max4(a, b),
             k.floor4(a),

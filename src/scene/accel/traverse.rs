@@ -1,7 +1,7 @@
 //! Rays through the wide tree.
 
 use super::{LANES, LEAF, LeafRef, TopLevel, WideNode};
-use crate::grid::LatticeRay;
+use crate::grid::{LatticeRay, Plane};
 use crate::ids::PatchId;
 use crate::math::simd::Kernel;
 
@@ -28,9 +28,9 @@ impl TopLevel {
     /// A walk along a ray, at its start.
     #[inline(always)]
     pub fn walk<'t>(&'t self, stack: &'t mut TraversalStack) -> Walk<'t> {
-        let entries = stack.empty(self.stack_need);
-        entries.push(entry(0.0, 0));
-        Walk { tree: self, stack: entries }
+        let entries = stack.of_size(self.stack_need + LANES);
+        entries[0] = entry(0.0, 0);
+        Walk { tree: self, stack: entries, n: 1 }
     }
 
     /// Calls `visit` for the patches whose boxes the ray meets, the nearest of each node first, until the rest lie beyond
@@ -66,35 +66,15 @@ impl TopLevel {
         false
     }
 
-    /// Pushes the lanes of `node` that the ray meets.
+    /// Asks for what a target leads to.
     #[inline(always)]
-    fn push_children<K: Kernel>(
-        &self,
-        k: K,
-        ray: &LatticeRay,
-        t_max: f32,
-        node: u32,
-        stack: &mut Vec<Entry>,
-        prefetch: &impl Fn(u32),
-    ) {
-        let wide = &self.nodes[node as usize];
-        let (mut mask, t_near) = wide.test(k, ray, t_max);
-        while mask != 0 {
-            let lane = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
-            let target = if wide.refs[lane] & LEAF != 0 {
-                let slot = node * LANES as u32 + lane as u32;
-                prefetch(slot);
-                LEAF | slot
-            } else {
-                let inner = wide.refs[lane];
-                let lines: *const [u8; 64] = (&raw const self.nodes[inner as usize]).cast();
-                for line in 0..4 {
-                    k.prefetch(lines.wrapping_add(line));
-                }
-                inner
-            };
-            stack.push(entry(t_near[lane], target));
+    fn prefetch<K: Kernel>(&self, k: K, target: u32, leaf: &impl Fn(u32)) {
+        if target & LEAF != 0 {
+            return leaf(target & !LEAF);
+        }
+        let lines: *const [u8; 64] = self.nodes.as_ptr().wrapping_add(target as usize).cast();
+        for line in 0..4 {
+            k.prefetch(lines.wrapping_add(line));
         }
     }
 
@@ -111,7 +91,9 @@ impl TopLevel {
 /// It hands out leaves instead of calling back: code with vector instructions in a closure would be compiled without them.
 pub struct Walk<'t> {
     tree: &'t TopLevel,
-    stack: &'t mut Vec<Entry>,
+    stack: &'t mut [Entry],
+    /// Entries on the stack.
+    n: usize,
 }
 
 impl Walk<'_> {
@@ -125,68 +107,136 @@ impl Walk<'_> {
         t_max: f32,
         prefetch: impl Fn(u32),
     ) -> Option<LeafRef> {
-        while let Some(current) = self.stack.pop() {
-            let target = current as u32;
+        while self.n > 0 {
+            self.n -= 1;
+            let current = self.stack[self.n];
             if t_of(current) > t_max {
                 continue;
             }
-            if target & LEAF != 0 {
-                return Some(self.tree.leaf(target));
+            let mut next = Some(current as u32);
+            while let Some(target) = next {
+                if target & LEAF != 0 {
+                    return Some(self.tree.leaf(target));
+                }
+                next = self.descend(kernel, ray, t_max, target, &prefetch);
             }
-            let first = self.stack.len();
-            self.tree.push_children(kernel, ray, t_max, target, self.stack, &prefetch);
-            sort_descending(&mut self.stack[first..]);
         }
         None
+    }
+
+    /// The nearest child of a node that the ray meets; the others go onto the stack.
+    #[inline(always)]
+    fn descend<K: Kernel>(
+        &mut self,
+        k: K,
+        ray: &LatticeRay,
+        t_max: f32,
+        node: u32,
+        prefetch: &impl Fn(u32),
+    ) -> Option<u32> {
+        let wide = &self.tree.nodes[node as usize];
+        let (mask, t_near) = wide.test(k, ray, t_max);
+        if mask == 0 {
+            return None;
+        }
+        let target = |lane: usize| wide.target(node, lane);
+        let (lane, rest) = (mask.trailing_zeros() as usize % LANES, mask & (mask - 1));
+        if rest == 0 {
+            return Some(target(lane));
+        }
+        let t_near = k.store(t_near);
+        let room: &mut [Entry; LANES] = self.stack[self.n..].first_chunk_mut().expect("room for a node's lanes");
+        let (other, mut rest) = (rest.trailing_zeros() as usize % LANES, rest & (rest - 1));
+        if rest == 0 {
+            let (near, far) = if t_near[lane] <= t_near[other] { (lane, other) } else { (other, lane) };
+            let far_target = target(far);
+            self.tree.prefetch(k, far_target, prefetch);
+            room[0] = entry(t_near[far], far_target);
+            self.n += 1;
+            return Some(target(near));
+        }
+        room[0] = entry(t_near[lane], target(lane));
+        room[1] = entry(t_near[other], target(other));
+        let mut n = 2;
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize % LANES;
+            rest &= rest - 1;
+            room[n % LANES] = entry(t_near[lane], target(lane));
+            n += 1;
+        }
+        sort_descending(&mut room[..n.min(LANES)]);
+        for entry in &room[..(n - 1) % LANES] {
+            self.tree.prefetch(k, *entry as u32, prefetch);
+        }
+        self.n += n - 1;
+        Some(room[(n - 1) % LANES] as u32)
     }
 
     /// The next patch whose box the ray meets, in any order.
     #[inline(always)]
     pub fn any<K: Kernel>(&mut self, kernel: K, ray: &LatticeRay, prefetch: impl Fn(u32)) -> Option<LeafRef> {
-        while let Some(current) = self.stack.pop() {
-            let target = current as u32;
-            if target & LEAF != 0 {
-                return Some(self.tree.leaf(target));
+        while self.n > 0 {
+            self.n -= 1;
+            let node = self.stack[self.n] as u32;
+            if node & LEAF != 0 {
+                return Some(self.tree.leaf(node));
             }
-            self.tree.push_children(kernel, ray, ray.t_max, target, self.stack, &prefetch);
+            let wide = &self.tree.nodes[node as usize];
+            let (mut mask, _) = wide.test(kernel, ray, ray.t_max);
+            let room: &mut [Entry; LANES] = self.stack[self.n..].first_chunk_mut().expect("room for a node's lanes");
+            let mut n = 0;
+            while mask != 0 {
+                let target = wide.target(node, mask.trailing_zeros() as usize % LANES);
+                mask &= mask - 1;
+                self.tree.prefetch(kernel, target, &prefetch);
+                room[n % LANES] = entry(0.0, target);
+                n += 1;
+            }
+            self.n += n;
         }
         None
     }
 }
 
 impl WideNode {
+    /// What a lane of this node, number `node`, leads to.
+    #[inline(always)]
+    fn target(&self, node: u32, lane: usize) -> u32 {
+        let reference = self.refs[lane % LANES];
+        if reference & LEAF != 0 { LEAF | node * LANES as u32 + lane as u32 } else { reference }
+    }
+
     /// The lanes that the ray meets between 0 and `t_max`, and where it enters them.
     #[inline(always)]
-    fn test<K: Kernel>(&self, k: K, ray: &LatticeRay, t_max: f32) -> (u32, [f32; LANES]) {
+    fn test<K: Kernel>(&self, k: K, ray: &LatticeRay, t_max: f32) -> (u32, K::F) {
         let (mut enter, mut leave) = (k.splat(0.0), k.splat(t_max));
         for axis in 0..3 {
             let inv = k.splat(ray.inv[axis]);
-            let near = axis + 3 * ray.is_negative[axis];
-            let far = axis + 3 * (1 - ray.is_negative[axis]);
-            enter = k.max(self.plane_t(k, near, ray.near_origin[axis], inv), enter);
-            leave = k.min(self.plane_t(k, far, ray.far_origin[axis], inv), leave);
+            enter = k.max(self.plane_t(k, ray.near_planes[axis], ray.near_origin[axis], inv), enter);
+            leave = k.min(self.plane_t(k, ray.far_planes[axis], ray.far_origin[axis], inv), leave);
         }
-        (k.le(enter, leave), k.store(enter))
+        (k.le(enter, leave), enter)
     }
 
     /// t of one plane of all lanes.
     #[inline(always)]
-    fn plane_t<K: Kernel>(&self, k: K, plane: usize, origin: f32, inv: K::F) -> K::F {
-        k.mul(k.sub(k.load(&self.planes[plane]), k.splat(origin)), inv)
+    fn plane_t<K: Kernel>(&self, k: K, plane: Plane, origin: f32, inv: K::F) -> K::F {
+        k.mul(k.sub(k.load(&self.planes[plane as usize]), k.splat(origin)), inv)
     }
 }
 
 impl TraversalStack {
-    /// The stack, empty, with room for `need` entries.
+    /// The stack, with room for `need` entries.
     #[inline(always)]
-    fn empty(&mut self, need: usize) -> &mut Vec<Entry> {
-        self.entries.clear();
-        self.entries.reserve(need);
+    fn of_size(&mut self, need: usize) -> &mut [Entry] {
+        if self.entries.len() < need {
+            self.entries.resize(need, 0);
+        }
         &mut self.entries
     }
 }
 
-/// Insertion sort, greatest first: lists have eight entries at most, and one or two as a rule.
+/// Insertion sort, greatest first.
 #[inline(always)]
 fn sort_descending(entries: &mut [Entry]) {
     for i in 1..entries.len() {
