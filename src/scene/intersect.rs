@@ -291,16 +291,23 @@ impl Task for ClosestInPatch<'_, '_, '_, '_> {
                 continue;
             };
             let (slot, cells) = level.child(lane);
-            let block = match visit.get(slot) {
-                Some(block) => block,
-                None => builder.build(visit, slot, of, Some(cells)),
-            };
-            builder.note_child(depth + 1, lane, block);
-            if is_node(block.bytes()) {
-                depth += 1;
-                levels[depth] = Some(Level::new(kernel, visit, block, ray, hit.t));
+            if let Some(block) = visit.get(slot) {
+                builder.note_child(depth + 1, lane, block);
+                if is_node(block.bytes()) {
+                    depth += 1;
+                    levels[depth] = Some(Level::new(kernel, visit, block, ray, hit.t));
+                } else {
+                    PieceView::new(block.bytes()).closest(kernel, ray, of.patch, hit);
+                }
             } else {
-                PieceView::new(block.bytes()).closest(kernel, ray, of.patch, hit);
+                let block = builder.build(visit, slot, of, Some(cells));
+                builder.note_child(depth + 1, lane, block);
+                if is_node(block.bytes()) {
+                    depth += 1;
+                    levels[depth] = Some(kernel.enter(OpenLevel { visit, block, ray, t_max: hit.t }));
+                } else {
+                    kernel.enter(ClosestInPiece { block, patch: of.patch, ray, hit });
+                }
             }
         }
     }
@@ -373,19 +380,78 @@ impl Task for OccludedInPatch<'_, '_, '_, '_> {
                 continue;
             };
             let (slot, cells) = level.child(lane);
-            let block = match visit.get(slot) {
-                Some(block) => block,
-                None => builder.build(visit, slot, of, Some(cells)),
+            let is_hit = if let Some(block) = visit.get(slot) {
+                builder.note_child(depth + 1, lane, block);
+                if is_node(block.bytes()) {
+                    depth += 1;
+                    levels[depth] = Some(Level::new(kernel, visit, block, ray, ray.t_max()));
+                    continue;
+                }
+                PieceView::new(block.bytes()).occluded(kernel, ray, of.patch)
+            } else {
+                let block = builder.build(visit, slot, of, Some(cells));
+                builder.note_child(depth + 1, lane, block);
+                if is_node(block.bytes()) {
+                    depth += 1;
+                    levels[depth] = Some(kernel.enter(OpenLevel { visit, block, ray, t_max: ray.t_max() }));
+                    continue;
+                }
+                kernel.enter(OccludedInPiece { block, patch: of.patch, ray })
             };
-            builder.note_child(depth + 1, lane, block);
-            if is_node(block.bytes()) {
-                depth += 1;
-                levels[depth] = Some(Level::new(kernel, visit, block, ray, ray.t_max()));
-            } else if PieceView::new(block.bytes()).occluded(kernel, ray, of.patch) {
+            if is_hit {
                 return true;
             }
         }
         false
+    }
+}
+
+// What is done with a block that was just built, apart from the code for blocks that are there.
+
+struct OpenLevel<'a, 'v, 'p> {
+    visit: &'v Visit<'p>,
+    block: Block<'v>,
+    ray: &'a LatticeRay,
+    t_max: f32,
+}
+
+impl<'v> Task for OpenLevel<'_, 'v, '_> {
+    type Output = Level<'v>;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> Level<'v> {
+        Level::new(kernel, self.visit, self.block, self.ray, self.t_max)
+    }
+}
+
+struct ClosestInPiece<'a, 'v> {
+    block: Block<'v>,
+    patch: PatchId,
+    ray: &'a LatticeRay,
+    hit: &'a mut LatticeHit,
+}
+
+impl Task for ClosestInPiece<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) {
+        PieceView::new(self.block.bytes()).closest(kernel, self.ray, self.patch, self.hit);
+    }
+}
+
+struct OccludedInPiece<'a, 'v> {
+    block: Block<'v>,
+    patch: PatchId,
+    ray: &'a LatticeRay,
+}
+
+impl Task for OccludedInPiece<'_, '_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> bool {
+        PieceView::new(self.block.bytes()).occluded(kernel, self.ray, self.patch)
     }
 }
 

@@ -142,7 +142,11 @@ impl Walk<'_> {
         let target = |lane: usize| wide.target(node, lane);
         let (lane, rest) = (mask.trailing_zeros() as usize % LANES, mask & (mask - 1));
         if rest == 0 {
-            return Some(target(lane));
+            let only = target(lane);
+            if only & LEAF != 0 {
+                prefetch(only & !LEAF);
+            }
+            return Some(only);
         }
         let t_near = k.store(t_near);
         let room: &mut [Entry; LANES] = self.stack[self.n..].first_chunk_mut().expect("room for a node's lanes");
