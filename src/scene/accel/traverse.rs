@@ -124,7 +124,7 @@ impl Walk<'_> {
         None
     }
 
-    /// The nearest child of a node that the ray meets; the others go onto the stack.
+    /// The nearest child of a node that the ray meets; the others go onto the stack. Announces those others, and leaves.
     #[inline(always)]
     fn descend<K: Kernel>(
         &mut self,
@@ -134,7 +134,8 @@ impl Walk<'_> {
         node: u32,
         prefetch: &impl Fn(u32),
     ) -> Option<u32> {
-        let wide = &self.tree.nodes[node as usize];
+        let tree = self.tree;
+        let wide = &tree.nodes[node as usize];
         let (mask, t_near) = wide.test(k, ray, t_max);
         if mask == 0 {
             return None;
@@ -142,11 +143,7 @@ impl Walk<'_> {
         let target = |lane: usize| wide.target(node, lane);
         let (lane, rest) = (mask.trailing_zeros() as usize % LANES, mask & (mask - 1));
         if rest == 0 {
-            let only = target(lane);
-            if only & LEAF != 0 {
-                prefetch(only & !LEAF);
-            }
-            return Some(only);
+            return Some(announced_leaf(target(lane), prefetch));
         }
         let t_near = k.store(t_near);
         let room: &mut [Entry; LANES] = self.stack[self.n..].first_chunk_mut().expect("room for a node's lanes");
@@ -154,10 +151,10 @@ impl Walk<'_> {
         if rest == 0 {
             let (near, far) = if t_near[lane] <= t_near[other] { (lane, other) } else { (other, lane) };
             let far_target = target(far);
-            self.tree.prefetch(k, far_target, prefetch);
+            tree.prefetch(k, far_target, prefetch);
             room[0] = entry(t_near[far], far_target);
             self.n += 1;
-            return Some(target(near));
+            return Some(announced_leaf(target(near), prefetch));
         }
         room[0] = entry(t_near[lane], target(lane));
         room[1] = entry(t_near[other], target(other));
@@ -170,10 +167,10 @@ impl Walk<'_> {
         }
         sort_descending(&mut room[..n.min(LANES)]);
         for entry in &room[..(n - 1) % LANES] {
-            self.tree.prefetch(k, *entry as u32, prefetch);
+            tree.prefetch(k, *entry as u32, prefetch);
         }
         self.n += n - 1;
-        Some(room[(n - 1) % LANES] as u32)
+        Some(announced_leaf(room[(n - 1) % LANES] as u32, prefetch))
     }
 
     /// The next patch whose box the ray meets, in any order.
@@ -238,6 +235,15 @@ impl TraversalStack {
         }
         &mut self.entries
     }
+}
+
+/// The target, announced if it is a leaf; a node that is looked at next needs no announcement.
+#[inline(always)]
+fn announced_leaf(target: u32, prefetch: &impl Fn(u32)) -> u32 {
+    if target & LEAF != 0 {
+        prefetch(target & !LEAF);
+    }
+    target
 }
 
 /// Insertion sort, greatest first.
