@@ -3,7 +3,7 @@
 //! Face 0 is the target and half-edge 0 its first corner. Only the target's corners know all their faces (up to
 //! infinitely sharp edges, which nothing crosses); that is enough to refine the target and the rings of its quarters.
 
-use crate::topology::{Fan, HalfEdges, NONE, Topology, VertexTags, fan};
+use crate::topology::{Fan, HalfEdges, NONE, VertexTags, fan};
 use rustc_hash::FxHashMap;
 
 /// The ring of a target face.
@@ -27,7 +27,7 @@ pub struct LocalMesh {
 }
 
 /// A ring and where its vertices come from.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Extracted {
     /// The ring.
     pub mesh: LocalMesh,
@@ -117,9 +117,9 @@ impl LocalMesh {
         edges
     }
 
-    /// Everything that decides the plan, as words to hash and compare.
-    pub fn key(&self) -> Vec<u32> {
-        let mut key = Vec::with_capacity(3 * self.n_half_edges() + 16);
+    /// Everything that decides the plan, as words to hash and compare, in place of what was in `key`.
+    pub fn key(&self, key: &mut Vec<u32>) {
+        key.clear();
         key.push(self.n_faces() as u32);
         key.extend_from_slice(&self.face_start);
         key.extend_from_slice(&self.vertex);
@@ -134,7 +134,6 @@ impl LocalMesh {
                 key.extend(tags.semi_sharp.iter().map(|s| s.to_bits()));
             }
         }
-        key
     }
 }
 
@@ -146,122 +145,9 @@ fn is_border<M: HalfEdges + ?Sized>(mesh: &M, h: u32, cut: bool) -> bool {
 ///
 /// `outer_tags`: whether vertices that are not corners of the target keep their semi-sharp edges (chaikin needs them).
 pub fn extract<M: HalfEdges + ?Sized>(mesh: &M, first: u32, outer_tags: bool) -> Extracted {
-    let mut x = Extractor { source: mesh, starts: Vec::new(), place_of_face: FxHashMap::default() };
-    x.add_face(first);
-    let n_corners = mesh.face_corners(mesh.face(first)).1;
-    let mut h = first;
-    let mut corner_tags = Vec::with_capacity(n_corners as usize);
-    for _ in 0..n_corners {
-        let tags = mesh.vertex_tags(h);
-        let cut = tags.n_infinite >= 2;
-        let fan = fan(mesh, h, |e| is_border(mesh, e, cut));
-        // Counter-clockwise from the target, then what lies clockwise of it: an order that only topology decides.
-        let at = fan.spokes.iter().position(|&s| s == h).expect("the fan holds its own spoke");
-        fan.spokes[at..].iter().chain(fan.spokes[..at].iter().rev()).for_each(|&s| x.add_face(s));
-        corner_tags.push(tags);
-        h = mesh.next(h);
-    }
-    x.finish(&corner_tags, outer_tags)
-}
-
-/// Rings with more faces or corners than these are found by [`extract`], whose time does not grow with the square of
-/// their size.
-const MAX_SCANNED_FACES: usize = 64;
-const MAX_SCANNED_CORNERS: u32 = 512;
-
-/// Finds the vertices of rings without making the ring: what loading a patch needs, again and again.
-#[derive(Debug, Default)]
-pub struct RingWalker {
-    /// Half-edge where each face of the ring starts.
-    starts: Vec<u32>,
-    faces: Vec<u32>,
-    vertices: Vec<u32>,
-}
-
-impl RingWalker {
-    /// The sources that [`extract`] gives for the face of `first`.
-    pub fn sources(&mut self, topology: &Topology, first: u32, outer_tags: bool) -> &[u32] {
-        self.starts.clear();
-        self.faces.clear();
-        self.vertices.clear();
-        self.add_face(topology, first);
-        let n_corners = topology.face_corners(topology.face(first)).1;
-        let mut h = first;
-        for _ in 0..n_corners {
-            self.add_fan(topology, h);
-            h = topology.next(h);
-            if self.faces.len() > MAX_SCANNED_FACES {
-                self.vertices = extract(topology, first, outer_tags).sources;
-                return &self.vertices;
-            }
-        }
-        if self.n_corners(topology) > MAX_SCANNED_CORNERS {
-            self.vertices = extract(topology, first, outer_tags).sources;
-            return &self.vertices;
-        }
-        self.add_vertices(topology);
-        for _ in 0..n_corners {
-            if let Some(ends) = topology.crease_ends(h) {
-                ends.into_iter().for_each(|v| self.add_vertex(v));
-            }
-            h = topology.next(h);
-        }
-        &self.vertices
-    }
-
-    fn n_corners(&self, topology: &Topology) -> u32 {
-        self.faces.iter().map(|&face| topology.face_corners(face).1).sum()
-    }
-
-    fn add_face(&mut self, topology: &Topology, h: u32) {
-        let face = topology.face(h);
-        if !self.faces.contains(&face) {
-            self.faces.push(face);
-            self.starts.push(h);
-        }
-    }
-
-    /// The faces around a corner in [`extract`]'s order: counter-clockwise, then what lies clockwise.
-    fn add_fan(&mut self, topology: &Topology, h: u32) {
-        let cut = topology.is_tagged(topology.vertex(h)) && topology.vertex_tags(h).n_infinite >= 2;
-        let mut spoke = h;
-        loop {
-            let arriving = topology.prev(spoke);
-            if is_border(topology, arriving, cut) {
-                break;
-            }
-            spoke = topology.twin(arriving);
-            if spoke == h {
-                return;
-            }
-            self.add_face(topology, spoke);
-        }
-        spoke = h;
-        while !is_border(topology, spoke, cut) {
-            spoke = topology.next(topology.twin(spoke));
-            self.add_face(topology, spoke);
-        }
-    }
-
-    fn add_vertices(&mut self, topology: &Topology) {
-        for i in 0..self.starts.len() {
-            let start = self.starts[i];
-            let mut h = start;
-            loop {
-                self.add_vertex(topology.vertex(h));
-                h = topology.next(h);
-                if h == start {
-                    break;
-                }
-            }
-        }
-    }
-
-    fn add_vertex(&mut self, v: u32) {
-        if !self.vertices.contains(&v) {
-            self.vertices.push(v);
-        }
-    }
+    let mut walker = RingWalker::default();
+    walker.extract(mesh, first, outer_tags);
+    walker.ring
 }
 
 /// As [`extract`], with all faces at the target's corners, whatever sharp or non-manifold edges lie between: edits can reach
@@ -273,102 +159,243 @@ pub fn extract_whole<M: HalfEdges + ?Sized>(
     outer_tags: bool,
     spokes: impl Fn(u32) -> Vec<u32>,
 ) -> Extracted {
-    let mut x = Extractor { source: mesh, starts: Vec::new(), place_of_face: FxHashMap::default() };
-    x.add_face(first);
+    let mut walker = RingWalker::default();
+    walker.add_face(mesh, first);
     let (start, n_corners) = mesh.face_corners(mesh.face(first));
     let corners: Vec<u32> = (0..n_corners).map(|k| start + (first - start + k) % n_corners).collect();
     let touching = corners.iter().flat_map(|&h| spokes(mesh.vertex(h))).map(|spoke| mesh.face(spoke));
-    touching.for_each(|face| x.add_face(mesh.face_corners(face).0));
+    touching.for_each(|face| walker.add_face(mesh, mesh.face_corners(face).0));
     let corner_tags: Vec<VertexTags> = corners.iter().map(|&h| mesh.vertex_tags(h)).collect();
-    x.finish(&corner_tags, outer_tags)
+    walker.add_vertices(mesh, n_corners);
+    walker.write(mesh, &corner_tags, outer_tags);
+    walker.ring
 }
 
-struct Extractor<'a, M: ?Sized> {
-    source: &'a M,
-    /// Half-edge of the source where each local face starts.
-    starts: Vec<u32>,
-    place_of_face: FxHashMap<u32, u32>,
+/// Values that are looked up one after the other, longer lists by a table.
+const LONGEST_SCAN: usize = 64;
+
+/// Numbers for values, in the order in which they come first.
+#[derive(Debug, Default)]
+struct Numbering {
+    values: Vec<u32>,
+    /// Of all values, once there are more than [`LONGEST_SCAN`].
+    table: FxHashMap<u32, u32>,
 }
 
-impl<M: HalfEdges + ?Sized> Extractor<'_, M> {
-    fn add_face(&mut self, h: u32) {
-        let place = self.starts.len() as u32;
-        let face = self.source.face(h);
-        if *self.place_of_face.entry(face).or_insert(place) == place {
-            self.starts.push(h);
+impl Numbering {
+    fn clear(&mut self) {
+        self.values.clear();
+        self.table.clear();
+    }
+
+    #[inline(always)]
+    fn find(&self, value: u32) -> Option<u32> {
+        if self.values.len() > LONGEST_SCAN {
+            return self.table.get(&value).copied();
+        }
+        self.values.iter().position(|&v| v == value).map(|i| i as u32)
+    }
+
+    /// The value's number, and whether it is new.
+    #[inline(always)]
+    fn number(&mut self, value: u32) -> (u32, bool) {
+        if let Some(known) = self.find(value) {
+            return (known, false);
+        }
+        let number = self.values.len() as u32;
+        self.values.push(value);
+        if self.values.len() > LONGEST_SCAN {
+            self.note(number);
+        }
+        (number, true)
+    }
+
+    fn note(&mut self, number: u32) {
+        let from = if self.table.is_empty() { 0 } else { number };
+        for n in from..=number {
+            self.table.insert(self.values[n as usize], n);
+        }
+    }
+}
+
+/// Finds rings, one after the other, in memory that it keeps.
+#[derive(Debug, Default)]
+pub struct RingWalker {
+    /// The source's faces and vertices.
+    faces: Numbering,
+    vertices: Numbering,
+    /// Half-edges of the source, in the ring's order.
+    half_edges: Vec<u32>,
+    /// Tags of the target's corners.
+    corner_tags: Vec<VertexTags>,
+    ring: Extracted,
+}
+
+impl RingWalker {
+    /// The sources that [`extract`] gives for the face of `first`, without the ring: what loading a patch needs, again and
+    /// again.
+    pub fn sources<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32) -> &[u32] {
+        self.walk(mesh, first);
+        &self.vertices.values
+    }
+
+    /// As [`extract`].
+    pub fn extract<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32, outer_tags: bool) -> &Extracted {
+        self.walk(mesh, first);
+        let corner_tags = std::mem::take(&mut self.corner_tags);
+        self.write(mesh, &corner_tags, outer_tags);
+        self.corner_tags = corner_tags;
+        &self.ring
+    }
+
+    /// Hands over the ring that was extracted last.
+    pub fn take(&mut self) -> Extracted {
+        std::mem::take(&mut self.ring)
+    }
+
+    /// Faces, vertices and the tags of corners.
+    fn walk<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32) {
+        self.clear();
+        self.add_face(mesh, first);
+        let (start, n_corners) = mesh.face_corners(mesh.face(first));
+        for k in 0..n_corners {
+            let turned = first + k;
+            self.add_corner(mesh, if turned < start + n_corners { turned } else { turned - n_corners });
+        }
+        self.add_vertices(mesh, n_corners);
+    }
+
+    fn clear(&mut self) {
+        self.faces.clear();
+        self.vertices.clear();
+        self.corner_tags.clear();
+        let ring = &mut self.ring;
+        ring.starts.clear();
+        self.half_edges.clear();
+        ring.mesh.face_start.clear();
+        ring.mesh.vertex.clear();
+        ring.mesh.face.clear();
+        ring.mesh.fins.clear();
+    }
+
+    #[inline(always)]
+    fn add_face<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32) {
+        if self.faces.number(mesh.face(h)).1 {
+            self.ring.starts.push(h);
         }
     }
 
-    fn finish(self, corner_tags: &[VertexTags], outer_tags: bool) -> Extracted {
-        let mut mesh = LocalMesh { face_start: vec![0], ..Default::default() };
-        let mut half_edges = Vec::new();
-        let mut sources: Vec<u32> = Vec::new();
-        let mut local_vertex = FxHashMap::default();
-        for (place, &start) in self.starts.iter().enumerate() {
-            let mut h = start;
-            loop {
-                let v = self.source.vertex(h);
-                mesh.vertex.push(*local_vertex.entry(v).or_insert_with(|| {
-                    sources.push(v);
-                    sources.len() as u32 - 1
-                }));
-                mesh.face.push(place as u32);
-                half_edges.push(h);
-                h = self.source.next(h);
-                if h == start {
-                    break;
-                }
-            }
-            mesh.face_start.push(half_edges.len() as u32);
+    /// Adds the faces around a corner of the target, counter-clockwise, then what lies clockwise of it: an order that only
+    /// topology decides.
+    fn add_corner<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32) {
+        if mesh.is_plain(h) {
+            let is_closed = self.add_fan(mesh, h, false);
+            self.corner_tags.push(VertexTags { n_infinite: if is_closed { 0 } else { 2 }, ..Default::default() });
+        } else {
+            let tags = mesh.vertex_tags(h);
+            self.add_fan(mesh, h, tags.n_infinite >= 2);
+            self.corner_tags.push(tags);
         }
-        for (k, &corner) in half_edges[..corner_tags.len()].iter().enumerate() {
-            if let Some(ends) = self.source.crease_ends(corner) {
-                let local = ends.map(|v| {
-                    *local_vertex.entry(v).or_insert_with(|| {
-                        sources.push(v);
-                        sources.len() as u32 - 1
-                    })
-                });
-                mesh.fins.push((mesh.vertex[k], local));
+    }
+
+    /// Returns whether the faces close around the corner.
+    fn add_fan<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32, cut: bool) -> bool {
+        let mut spoke = h;
+        loop {
+            let arriving = mesh.prev(spoke);
+            if is_border(mesh, arriving, cut) {
+                break;
+            }
+            spoke = mesh.twin(arriving);
+            if spoke == h {
+                return true;
+            }
+            self.add_face(mesh, spoke);
+        }
+        spoke = h;
+        while !is_border(mesh, spoke, cut) {
+            spoke = mesh.next(mesh.twin(spoke));
+            self.add_face(mesh, spoke);
+        }
+        false
+    }
+
+    /// Adds the vertices of all faces, then the ends of fins at corners.
+    fn add_vertices<M: HalfEdges + ?Sized>(&mut self, mesh: &M, n_corners: u32) {
+        let ring = &mut self.ring.mesh;
+        ring.face_start.push(0);
+        for (place, (&start, &face)) in self.ring.starts.iter().zip(&self.faces.values).enumerate() {
+            let (first, n) = mesh.face_corners(face);
+            for h in (start..first + n).chain(first..start) {
+                ring.vertex.push(self.vertices.number(mesh.vertex(h)).0);
+                ring.face.push(place as u32);
+                self.half_edges.push(h);
+            }
+            ring.face_start.push(self.half_edges.len() as u32);
+        }
+        for (k, &corner) in self.half_edges[..n_corners as usize].iter().enumerate() {
+            if let Some(ends) = mesh.crease_ends(corner) {
+                ring.fins.push((ring.vertex[k], ends.map(|v| self.vertices.number(v).0)));
             }
         }
-        mesh.twin = half_edges.iter().map(|&h| self.local(&mesh, self.source.twin(h))).collect();
-        self.set_tags(&mut mesh, &half_edges, sources.len(), corner_tags, outer_tags);
-        Extracted { mesh, sources, starts: self.starts }
+    }
+
+    /// Writes down what else the ring has: twins, tags and sharpness.
+    fn write<M: HalfEdges + ?Sized>(&mut self, mesh: &M, corner_tags: &[VertexTags], outer_tags: bool) {
+        self.ring.sources.clear();
+        self.ring.sources.extend_from_slice(&self.vertices.values);
+        let mut twin = std::mem::take(&mut self.ring.mesh.twin);
+        twin.clear();
+        twin.extend(self.half_edges.iter().map(|&h| self.local(mesh, mesh.twin(h))));
+        self.ring.mesh.twin = twin;
+        self.set_tags(mesh, corner_tags, outer_tags);
+        self.set_sharpness(mesh, corner_tags);
     }
 
     /// The local number of a half-edge of the source, or [`NONE`].
-    fn local(&self, mesh: &LocalMesh, h: u32) -> u32 {
+    #[inline(always)]
+    fn local<M: HalfEdges + ?Sized>(&self, mesh: &M, h: u32) -> u32 {
         if h == NONE {
             return NONE;
         }
-        let face = self.source.face(h);
-        let Some(&place) = self.place_of_face.get(&face) else { return NONE };
-        let (start, n) = self.source.face_corners(face);
-        let turned = (h - start + n - (self.starts[place as usize] - start)) % n;
-        mesh.face_start[place as usize] + turned
+        let Some(place) = self.faces.find(mesh.face(h)) else { return NONE };
+        let (start, next) = (self.ring.starts[place as usize], &self.ring.mesh.face_start[place as usize..]);
+        if h >= start { next[0] + h - start } else { next[1] - (start - h) }
     }
 
-    fn set_tags(&self, mesh: &mut LocalMesh, half_edges: &[u32], n: usize, corner_tags: &[VertexTags], outer: bool) {
-        mesh.tags = vec![VertexTags::default(); n];
+    fn set_tags<M: HalfEdges + ?Sized>(&mut self, mesh: &M, corner_tags: &[VertexTags], outer: bool) {
+        let ring = &mut self.ring.mesh;
+        ring.tags.clear();
+        ring.tags.resize(self.vertices.values.len(), VertexTags::default());
         if outer {
-            for (&v, &h) in mesh.vertex.iter().zip(half_edges) {
-                mesh.tags[v as usize].semi_sharp = self.source.vertex_tags(h).semi_sharp;
+            for (&v, &h) in ring.vertex.iter().zip(&self.half_edges) {
+                ring.tags[v as usize].semi_sharp = mesh.vertex_tags(h).semi_sharp;
             }
         }
-        let mut is_corner = vec![false; n];
-        for (k, tags) in corner_tags.iter().enumerate() {
-            let v = mesh.vertex[k] as usize;
-            is_corner[v] = true;
-            mesh.tags[v] = tags.clone();
+        for (&v, tags) in ring.vertex.iter().zip(corner_tags) {
+            ring.tags[v as usize].clone_from(tags);
         }
-        mesh.sharpness = (0..half_edges.len())
-            .map(|i| {
-                let ends = [mesh.vertex[i], mesh.vertex[mesh.next(i as u32) as usize]];
-                let known = ends.iter().any(|&v| is_corner[v as usize]);
-                if known && mesh.twin[i] != NONE { self.source.edge_sharpness(half_edges[i]) } else { 0.0 }
-            })
-            .collect();
+    }
+
+    fn set_sharpness<M: HalfEdges + ?Sized>(&mut self, mesh: &M, corner_tags: &[VertexTags]) {
+        let ring = &mut self.ring.mesh;
+        ring.sharpness.clear();
+        ring.sharpness.resize(self.half_edges.len(), 0.0);
+        if corner_tags.iter().all(|tags| *tags == VertexTags::default()) {
+            return;
+        }
+        // The target's vertices come first.
+        let n_corners = ring.vertex[..corner_tags.len()].iter().fold(0, |n, &v| n.max(v + 1));
+        for bounds in ring.face_start.windows(2) {
+            let (start, end) = (bounds[0] as usize, bounds[1] as usize);
+            for i in start..end {
+                let next = if i + 1 == end { start } else { i + 1 };
+                let is_known = ring.vertex[i].min(ring.vertex[next]) < n_corners;
+                if is_known && ring.twin[i] != NONE {
+                    ring.sharpness[i] = mesh.edge_sharpness(self.half_edges[i]);
+                }
+            }
+        }
     }
 }
 
@@ -377,6 +404,7 @@ mod tests {
     use super::*;
     use crate::mesh::random::random_mesh;
     use crate::mesh::shapes;
+    use crate::topology::Topology;
 
     #[test]
     fn walked_rings_are_the_extracted_ones() {
@@ -388,7 +416,7 @@ mod tests {
                 let first = topology.face_corners(face).0;
                 for outer_tags in [false, true] {
                     let extracted = extract(&topology, first, outer_tags).sources;
-                    assert_eq!(walker.sources(&topology, first, outer_tags), extracted);
+                    assert_eq!(walker.sources(&topology, first), extracted);
                 }
             }
         }

@@ -1,8 +1,8 @@
 //! The plan library: one node per distinct ring, shared by all faces, levels and meshes with the same rules.
 
-use super::local::{Extracted, LocalMesh, extract};
+use super::local::{LocalMesh, RingWalker};
 use super::rows::{RowStore, Span, SparseRows};
-use super::rules::{self, CornerLimit, Origin, Refined, Row, RuleSet};
+use super::rules::{self, CornerLimit, Origin, RefinedView, Row, RuleSet};
 use crate::mesh::CreaseMethod;
 use crate::topology::NONE;
 use rustc_hash::FxHashMap;
@@ -58,12 +58,23 @@ pub struct PlanLibrary {
     nodes: Vec<Option<Plan>>,
     n_points: Vec<u32>,
     by_key: FxHashMap<Vec<u32>, NodeId>,
+    /// Scratch.
+    key: Vec<u32>,
+    walker: RingWalker,
 }
 
 impl PlanLibrary {
     /// An empty library.
     pub fn new(rules: RuleSet) -> Self {
-        Self { rules, rows: RowStore::default(), nodes: Vec::new(), n_points: Vec::new(), by_key: FxHashMap::default() }
+        Self {
+            rules,
+            rows: RowStore::default(),
+            nodes: Vec::new(),
+            n_points: Vec::new(),
+            by_key: FxHashMap::default(),
+            key: Vec::new(),
+            walker: RingWalker::default(),
+        }
     }
 
     /// Number of nodes.
@@ -112,6 +123,8 @@ impl PlanLibrary {
     /// Forgets how nodes were found, once no more are needed.
     pub fn seal(&mut self) {
         self.by_key = FxHashMap::default();
+        self.key = Vec::new();
+        self.walker = RingWalker::default();
         self.rows.seal();
     }
 
@@ -122,14 +135,19 @@ impl PlanLibrary {
 
     /// The node for a ring, made if it is new.
     pub fn node(&mut self, ring: &LocalMesh) -> NodeId {
-        let key = ring.key();
-        if let Some(&id) = self.by_key.get(&key) {
-            return id;
-        }
+        let mut key = std::mem::take(&mut self.key);
+        ring.key(&mut key);
+        let id = self.find(&key).unwrap_or_else(|| self.make_node(ring, &key));
+        self.key = key;
+        id
+    }
+
+    /// The node for a ring that is new.
+    fn make_node(&mut self, ring: &LocalMesh, key: &[u32]) -> NodeId {
         let id = NodeId(self.nodes.len() as u32);
         self.nodes.push(None);
         self.n_points.push(ring.n_vertices() as u32);
-        self.by_key.insert(key, id);
+        self.by_key.insert(key.to_vec(), id);
         let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
         let plan = match regular {
             Some(rows) => Plan::Regular(self.rows.push(rows.iter().flatten())),
@@ -141,15 +159,14 @@ impl PlanLibrary {
 
     fn split(&mut self, id: NodeId, ring: &LocalMesh) -> Plan {
         let n = ring.n_corners();
-        let refined = rules::refine(&self.rules, ring);
-        let rings: Vec<Extracted> =
-            (0..n).map(|k| extract(&refined.mesh, child_start(n, k), self.outer_tags())).collect();
-        let (rows, points) = self.shared_rows(ring, &refined, &rings);
+        let (rows, quarters) = self.quarters(ring);
         let packed = self.rows.push(&rows);
-        let children: Box<[Child]> = rings
-            .iter()
-            .zip(points)
-            .map(|(child, points)| Child { node: self.node(&child.mesh), points: self.rows.push_indices(&points) })
+        let children: Box<[Child]> = quarters
+            .into_iter()
+            .map(|(node, points)| Child {
+                node: node.unwrap_or_else(|ring| self.node(&ring)),
+                points: self.rows.push_indices(&points),
+            })
             .collect();
         let n_limits = if n == 4 { 4 } else { 0 };
         let limits = (0..n_limits).map(|k| self.limit(id, ring, packed, &children[k as usize], k)).collect();
@@ -158,24 +175,26 @@ impl PlanLibrary {
         Plan::Split { rows: packed, children, limits, in_hull }
     }
 
-    /// Rows of the refined points that any child uses, and each child's points in terms of them.
-    fn shared_rows(&self, ring: &LocalMesh, refined: &Refined, rings: &[Extracted]) -> (Vec<Row>, Vec<Vec<u32>>) {
-        let mut place = vec![NONE; refined.origin.len()];
-        let mut rows = Vec::new();
-        let mut place_of = |&v: &u32| {
-            if place[v as usize] == NONE {
-                place[v as usize] = rows.len() as u32;
-                let origin = corner_origin(ring, refined.origin[v as usize]);
-                rows.push(rules::refined_row(&self.rules, ring, origin));
-            }
-            place[v as usize]
-        };
-        if ring.n_corners() != 4 {
-            let face_point = refined.origin.iter().position(|o| matches!(o, Origin::Face(0)));
-            place_of(&(face_point.expect("every face is refined") as u32));
+    /// Rows of the refined points that any quarter uses, and each quarter: its node, or its ring if that is new, and its
+    /// points in terms of those rows.
+    fn quarters(&mut self, ring: &LocalMesh) -> (Vec<Row>, Vec<Quarter>) {
+        let refined = RefinedView::new(self.rules, ring);
+        let mut rows =
+            RefinedRows { rules: self.rules, ring, place: vec![NONE; refined.origin.len()], rows: Vec::new() };
+        let n = ring.n_corners();
+        if n != 4 {
+            rows.place_of(&refined, refined.face_vertex(0));
         }
-        let points = rings.iter().map(|child| child.sources.iter().map(&mut place_of).collect()).collect();
-        (rows, points)
+        let (mut walker, mut key) = (std::mem::take(&mut self.walker), Vec::new());
+        let quarters = (0..n).map(|k| {
+            let child = walker.extract(&refined, child_start(n, k), self.outer_tags());
+            let points = child.sources.iter().map(|&v| rows.place_of(&refined, v)).collect();
+            child.mesh.key(&mut key);
+            (self.find(&key).ok_or_else(|| walker.take().mesh), points)
+        });
+        let quarters = quarters.collect();
+        self.walker = walker;
+        (rows.rows, quarters)
     }
 
     fn limit(&mut self, id: NodeId, ring: &LocalMesh, rows: SparseRows, child: &Child, k: u32) -> Limit {
@@ -244,6 +263,30 @@ impl PlanLibrary {
         }
         let row: Row = limit.iter().enumerate().filter(|(_, w)| **w != 0.0).map(|(p, &w)| (p as u32, w)).collect();
         self.rows.push([&row])
+    }
+}
+
+/// A quarter's node, or its ring, and its points.
+type Quarter = (Result<NodeId, LocalMesh>, Vec<u32>);
+
+/// The rows of a ring's refined points, each made when it is first asked for.
+struct RefinedRows<'a> {
+    rules: RuleSet,
+    ring: &'a LocalMesh,
+    /// For each refined point its row, or [`NONE`].
+    place: Vec<u32>,
+    rows: Vec<Row>,
+}
+
+impl RefinedRows<'_> {
+    fn place_of(&mut self, refined: &RefinedView<'_>, v: u32) -> u32 {
+        let place = &mut self.place[v as usize];
+        if *place == NONE {
+            *place = self.rows.len() as u32;
+            let origin = corner_origin(self.ring, refined.origin[v as usize]);
+            self.rows.push(rules::refined_row(&self.rules, self.ring, origin));
+        }
+        *place
     }
 }
 

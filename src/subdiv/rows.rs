@@ -80,6 +80,10 @@ pub struct RowStore {
     known: FxHashMap<Vec<u64>, u32>,
     /// Where lists of indices start, while they are added.
     known_lists: FxHashMap<Vec<u32>, u32>,
+    /// Scratch: a row in the order of its weights, its columns, and the bits of its weights.
+    sorted: Row,
+    list: Vec<u32>,
+    bits: Vec<u64>,
 }
 
 impl Default for RowStore {
@@ -91,6 +95,9 @@ impl Default for RowStore {
             indices: Indices::Narrow(Vec::new()),
             known: FxHashMap::default(),
             known_lists: FxHashMap::default(),
+            sorted: Row::new(),
+            list: Vec::new(),
+            bits: Vec::new(),
         }
     }
 }
@@ -203,39 +210,48 @@ impl RowStore {
     /// Adds rows.
     pub fn push<'a>(&mut self, rows: impl IntoIterator<Item = &'a Row>) -> SparseRows {
         let first = self.rows.len() as u32;
+        let mut sorted = std::mem::take(&mut self.sorted);
         for row in rows {
-            let mut row = row.clone();
-            row.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-            let columns: Vec<u32> = row.iter().map(|&(column, _)| column).collect();
-            let packed = PackedRow { columns: self.list_start(columns), mask: self.mask(&row) };
+            sorted.clear();
+            sorted.extend_from_slice(row);
+            sorted.sort_unstable_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+            let columns = self.list_start(sorted.iter().map(|&(column, _)| column));
+            let packed = PackedRow { columns, mask: self.mask(&sorted) };
             self.rows.push(packed);
         }
+        self.sorted = sorted;
         SparseRows { first, len: self.rows.len() as u32 - first }
     }
 
     /// Adds a list of indices.
     pub fn push_indices(&mut self, indices: &[u32]) -> Span {
-        Span { first: self.list_start(indices.to_vec()), len: indices.len() as u32 }
+        Span { first: self.list_start(indices.iter().copied()), len: indices.len() as u32 }
     }
 
     /// Where a list starts, added if it is new.
-    fn list_start(&mut self, list: Vec<u32>) -> u32 {
-        if let Some(&start) = self.known_lists.get(&list) {
+    fn list_start(&mut self, list: impl Iterator<Item = u32>) -> u32 {
+        self.list.clear();
+        self.list.extend(list);
+        if let Some(&start) = self.known_lists.get(&self.list) {
             return start;
         }
         let start = self.indices.len() as u32;
-        list.iter().for_each(|&i| self.indices.push(i));
-        self.known_lists.insert(list, start);
+        self.list.iter().for_each(|&i| self.indices.push(i));
+        self.known_lists.insert(self.list.clone(), start);
         start
     }
 
     fn mask(&mut self, row: &Row) -> u32 {
-        let bits: Vec<u64> = row.iter().map(|&(_, w)| w.to_bits()).collect();
-        *self.known.entry(bits).or_insert_with(|| {
-            self.masks.push(Mask { first: self.weights.len() as u32, len: row.len() as u32 });
-            self.weights.extend(row.iter().map(|&(_, w)| w));
-            self.masks.len() as u32 - 1
-        })
+        self.bits.clear();
+        self.bits.extend(row.iter().map(|&(_, w)| w.to_bits()));
+        if let Some(&mask) = self.known.get(&self.bits) {
+            return mask;
+        }
+        let mask = self.masks.len() as u32;
+        self.masks.push(Mask { first: self.weights.len() as u32, len: row.len() as u32 });
+        self.weights.extend(row.iter().map(|&(_, w)| w));
+        self.known.insert(self.bits.clone(), mask);
+        mask
     }
 
     /// Row `i` of some rows.
@@ -288,6 +304,7 @@ impl RowStore {
     /// Drops what only adding needs.
     pub fn seal(&mut self) {
         (self.known, self.known_lists) = Default::default();
+        (self.sorted, self.list, self.bits) = Default::default();
         self.rows.shrink_to_fit();
         self.masks.shrink_to_fit();
         self.weights.shrink_to_fit();

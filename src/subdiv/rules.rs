@@ -26,15 +26,15 @@ const SMOOTH_TRIANGLE_WEIGHT: f64 = 0.470;
 /// Adds up repeated points and drops zeros.
 pub fn merge(mut row: Row) -> Row {
     row.sort_by_key(|e| e.0);
-    let mut out: Row = Vec::with_capacity(row.len());
-    for (p, w) in row {
-        match out.last_mut() {
-            Some(last) if last.0 == p => last.1 += w,
-            _ => out.push((p, w)),
+    row.dedup_by(|next, sum| {
+        let is_same = next.0 == sum.0;
+        if is_same {
+            sum.1 += next.1;
         }
-    }
-    out.retain(|e| e.1 != 0.0);
-    out
+        is_same
+    });
+    row.retain(|e| e.1 != 0.0);
+    row
 }
 
 fn scaled(row: &[(u32, f64)], s: f64) -> impl Iterator<Item = (u32, f64)> + '_ {
@@ -385,6 +385,20 @@ pub struct Refined {
     pub origin: Vec<Origin>,
 }
 
+/// As [`Refined`], worked out where it is asked.
+pub struct RefinedView<'a> {
+    rules: RuleSet,
+    ring: &'a LocalMesh,
+    /// See [`Refined`].
+    pub origin: Vec<Origin>,
+    /// The vertex in the middle of each half-edge.
+    edge_vertex: Vec<u32>,
+    /// The vertex in the middle of face 0.
+    first_face: u32,
+    /// See [`LocalMesh`].
+    fins: Vec<(u32, [u32; 2])>,
+}
+
 /// Where a refined vertex comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
@@ -400,46 +414,115 @@ pub enum Origin {
     Nothing,
 }
 
-/// The topology and sharpness of a ring after one step.
+impl<'a> RefinedView<'a> {
+    /// The topology and sharpness of a ring after one step.
+    pub fn new(rules: RuleSet, ring: &'a LocalMesh) -> Self {
+        let n = ring.n_half_edges() as u32;
+        let mut origin: Vec<Origin> = Vec::with_capacity(ring.n_vertices() + n as usize + ring.n_faces());
+        origin.resize(ring.n_vertices(), Origin::Nothing);
+        for h in (0..n).rev() {
+            origin[ring.vertex(h) as usize] = Origin::Vertex(h);
+        }
+        let mut edge_vertex = vec![NONE; n as usize];
+        for h in 0..n {
+            let twin = ring.twin(h);
+            edge_vertex[h as usize] = if twin != NONE && twin < h {
+                edge_vertex[twin as usize]
+            } else {
+                origin.push(Origin::Edge(h));
+                origin.len() as u32 - 1
+            };
+        }
+        let first_face = origin.len() as u32;
+        origin.extend((0..ring.n_faces() as u32).map(Origin::Face));
+        let fins = ring
+            .fins
+            .iter()
+            .map(|&(v, ends)| (v, ends.map(|end| fin_edge_vertex(ring, v, end, &edge_vertex, &mut origin))));
+        let fins = fins.collect();
+        Self { rules, ring, origin, edge_vertex, first_face, fins }
+    }
+
+    /// The vertex in the middle of a face of the ring.
+    pub fn face_vertex(&self, face: u32) -> u32 {
+        self.first_face + face
+    }
+}
+
+impl HalfEdges for RefinedView<'_> {
+    #[inline]
+    fn vertex(&self, h: u32) -> u32 {
+        let before = h / 4;
+        match h % 4 {
+            0 => self.ring.vertex(before),
+            1 => self.edge_vertex[before as usize],
+            2 => self.first_face + self.ring.face(before),
+            _ => self.edge_vertex[self.ring.prev(before) as usize],
+        }
+    }
+
+    #[inline]
+    fn twin(&self, h: u32) -> u32 {
+        let before = h / 4;
+        match h % 4 {
+            0 => match self.ring.twin(before) {
+                NONE => NONE,
+                across => 4 * self.ring.next(across) + 3,
+            },
+            1 => 4 * self.ring.next(before) + 2,
+            2 => 4 * self.ring.prev(before) + 1,
+            _ => match self.ring.twin(self.ring.prev(before)) {
+                NONE => NONE,
+                across => 4 * across,
+            },
+        }
+    }
+
+    #[inline]
+    fn face(&self, h: u32) -> u32 {
+        h / 4
+    }
+
+    #[inline]
+    fn face_corners(&self, face: u32) -> (u32, u32) {
+        (4 * face, 4)
+    }
+
+    fn edge_sharpness(&self, h: u32) -> f32 {
+        if self.twin(h) == NONE {
+            return f32::INFINITY;
+        }
+        match h % 4 {
+            0 => halves(&self.rules, self.ring, h / 4)[0],
+            3 => halves(&self.rules, self.ring, self.ring.prev(h / 4))[1],
+            _ => 0.0,
+        }
+    }
+
+    fn vertex_tags(&self, h: u32) -> VertexTags {
+        refined_tags(&self.rules, self.ring, self.origin[self.vertex(h) as usize])
+    }
+
+    fn crease_ends(&self, h: u32) -> Option<[u32; 2]> {
+        let v = self.vertex(h);
+        self.fins.iter().find(|fin| fin.0 == v).map(|fin| fin.1)
+    }
+}
+
+/// The topology and sharpness of a ring after one step, written down.
 pub fn refine(rules: &RuleSet, mesh: &LocalMesh) -> Refined {
-    let n = mesh.n_half_edges() as u32;
-    let mut origin: Vec<Origin> = vec![Origin::Nothing; mesh.n_vertices()];
-    for h in (0..n).rev() {
-        origin[mesh.vertex(h) as usize] = Origin::Vertex(h);
-    }
-    let mut edge_vertex = vec![NONE; n as usize];
-    for h in 0..n {
-        let twin = mesh.twin(h);
-        edge_vertex[h as usize] = if twin != NONE && twin < h {
-            edge_vertex[twin as usize]
-        } else {
-            origin.push(Origin::Edge(h));
-            origin.len() as u32 - 1
-        };
-    }
-    let first_face = origin.len() as u32;
-    origin.extend((0..mesh.n_faces() as u32).map(Origin::Face));
-    let fins = mesh
-        .fins
-        .iter()
-        .map(|&(v, ends)| (v, ends.map(|end| fin_edge_vertex(mesh, v, end, &edge_vertex, &mut origin))));
-    let fins = fins.collect();
-    let mut out = LocalMesh { fins, face_start: (0..=n).map(|f| 4 * f).collect(), ..Default::default() };
-    for h in 0..n {
-        let (next, prev) = (mesh.next(h), mesh.prev(h));
-        let child_of = |t: u32, k: u32| if t == NONE { NONE } else { 4 * t + k };
-        let across = mesh.twin(h);
-        let before = mesh.twin(prev);
-        let face = first_face + mesh.face(h);
-        out.vertex.extend([mesh.vertex(h), edge_vertex[h as usize], face, edge_vertex[prev as usize]]);
-        out.face.extend([h; 4]);
-        let beside = if across == NONE { NONE } else { mesh.next(across) };
-        out.twin.extend([child_of(beside, 3), 4 * next + 2, 4 * prev + 1, child_of(before, 0)]);
-        let end_half = halves(rules, mesh, prev)[1];
-        out.sharpness.extend([halves(rules, mesh, h)[0], 0.0, 0.0, end_half]);
-    }
-    out.tags = origin.iter().map(|o| refined_tags(rules, mesh, *o)).collect();
-    Refined { mesh: out, origin }
+    let view = RefinedView::new(*rules, mesh);
+    let n = 4 * mesh.n_half_edges() as u32;
+    let out = LocalMesh {
+        face_start: (0..=n).step_by(4).collect(),
+        vertex: (0..n).map(|h| view.vertex(h)).collect(),
+        face: (0..n).map(|h| view.face(h)).collect(),
+        twin: (0..n).map(|h| view.twin(h)).collect(),
+        sharpness: (0..n).map(|h| view.edge_sharpness(h)).collect(),
+        tags: view.origin.iter().map(|o| refined_tags(rules, mesh, *o)).collect(),
+        fins: view.fins,
+    };
+    Refined { mesh: out, origin: view.origin }
 }
 
 /// The refined vertex in the middle of a fin's sharp edge: that of a half-edge if there is one, else one of its own.

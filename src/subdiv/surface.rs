@@ -2,7 +2,7 @@
 
 use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, sample_regular};
-use super::local::{RingWalker, extract};
+use super::local::RingWalker;
 use super::plan::{NodeId, PlanLibrary};
 use super::regular::ControlPoints;
 use super::rules::RuleSet;
@@ -256,7 +256,7 @@ impl Surface {
         }
         points.ring.clear();
         if size == 4 {
-            let sources = points.walker.sources(&self.topology, first, self.plans.outer_tags());
+            let sources = points.walker.sources(&self.topology, first);
             points.ring.extend(sources.iter().map(|&v| self.control_point(v)));
         } else {
             self.load_polygon(face, points);
@@ -272,7 +272,7 @@ impl Surface {
         }
         points.polygon_face = Some((self.id, face));
         let (first, _) = self.topology.face_corners(face.0);
-        let sources = points.walker.sources(&self.topology, first, self.plans.outer_tags());
+        let sources = points.walker.sources(&self.topology, first);
         points.polygon.clear();
         points.polygon.extend(sources.iter().map(|&v| self.control_point(v)));
         Evaluator::refine_polygon(&self.plans, points.node, &mut points.polygon);
@@ -437,11 +437,16 @@ fn plan_faces(topology: &Topology, rules: RuleSet, n_threads: usize, sites: &Edi
     let tasks: Vec<_> = plans.chunks_mut(FACES_PER_TASK).enumerate().map(parking_lot::Mutex::new).collect();
     let next = AtomicUsize::new(0);
     let work = || {
+        let (mut walker, mut key) = (RingWalker::default(), Vec::new());
         while let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
             let (chunk, plans) = &mut *task.lock();
             for (i, plan) in plans.iter_mut().enumerate() {
                 let face = FaceId::from(*chunk * FACES_PER_TASK + i);
-                *plan = if sites.contains(face) { EDITED } else { plan_face(topology, &library, face) };
+                *plan = if sites.contains(face) {
+                    EDITED
+                } else {
+                    plan_face(topology, &library, face, &mut walker, &mut key)
+                };
             }
         }
     };
@@ -455,13 +460,21 @@ fn plan_faces(topology: &Topology, rules: RuleSet, n_threads: usize, sites: &Edi
     (library.into_inner(), plans)
 }
 
-fn plan_face(topology: &Topology, library: &RwLock<PlanLibrary>, face: FaceId) -> NodeId {
+/// `walker` and `key` are scratch.
+fn plan_face(
+    topology: &Topology,
+    library: &RwLock<PlanLibrary>,
+    face: FaceId,
+    walker: &mut RingWalker,
+    key: &mut Vec<u32>,
+) -> NodeId {
     let (first, _) = topology.face_corners(face.0);
     if topology.is_hidden(face) || regular_ring(topology, first).is_some() {
         return REGULAR;
     }
     let outer_tags = library.read().outer_tags();
-    let ring = extract(topology, first, outer_tags).mesh;
-    let known = library.read().find(&ring.key());
-    known.unwrap_or_else(|| library.write().node(&ring))
+    let ring = &walker.extract(topology, first, outer_tags).mesh;
+    ring.key(key);
+    let known = library.read().find(key);
+    known.unwrap_or_else(|| library.write().node(ring))
 }

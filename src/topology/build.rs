@@ -515,6 +515,11 @@ impl HalfEdges for Topology {
         }
     }
 
+    #[inline]
+    fn is_plain(&self, h: u32) -> bool {
+        !self.is_tagged(self.vertex[h as usize].0)
+    }
+
     fn crease_ends(&self, h: u32) -> Option<[u32; 2]> {
         self.fin_ends.get(&self.vertex[h as usize].0).copied()
     }

@@ -38,6 +38,12 @@ pub trait HalfEdges {
     /// Tags of the vertex where `h` starts.
     fn vertex_tags(&self, h: u32) -> VertexTags;
 
+    /// Whether the vertex where `h` starts is known to be smooth, with smooth edges, borders aside; `false` may mean anything.
+    #[inline]
+    fn is_plain(&self, _h: u32) -> bool {
+        false
+    }
+
     /// The ends of the two infinitely sharp edges at the vertex where `h` starts, where faces around the vertex may not
     /// reach both: at inner vertices of fins.
     fn crease_ends(&self, h: u32) -> Option<[u32; 2]>;
