@@ -63,7 +63,7 @@ impl Evaluator {
     ) {
         match library.plan(node) {
             Plan::Regular(rows) => {
-                let control = control_points(library.rows(), *rows, &self.points[ring..]);
+                let control = control_points(library.rows(), rows, &self.points[ring..]);
                 self.grow_by_hull(bounds, &control, u, v);
             }
             Plan::Split { in_hull: true, .. } if depth == 0 => {
@@ -74,14 +74,14 @@ impl Evaluator {
                 let start = self.points.len();
                 let is_in_one_half = |range| half_range(range, 0.0).is_some() != half_range(range, 1.0).is_some();
                 let is_alone = is_in_one_half(u) && is_in_one_half(v);
-                let refined = if is_alone { None } else { Some(self.refine(library, *rows, ring)) };
+                let refined = if is_alone { None } else { Some(self.refine(library, rows, ring)) };
                 let mark = self.points.len();
                 for (k, child) in children.iter().enumerate() {
                     let (x, y) = quarter(k);
                     let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) else { continue };
                     let child_ring = match refined {
                         Some(refined) => self.push_child(library, child, refined),
-                        None => self.refine_child(library, *rows, child, ring),
+                        None => self.refine_child(library, rows, child, ring),
                     };
                     self.bound(library, child.node, child_ring, u, v, depth.saturating_sub(1), bounds);
                     self.points.truncate(mark);

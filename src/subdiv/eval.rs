@@ -195,7 +195,7 @@ impl Evaluator {
     ) {
         let (rows, children, limits) = match library.plan(node) {
             Plan::Regular(rows) => {
-                let control = control_points(library.rows(), *rows, &self.points[ring..]);
+                let control = control_points(library.rows(), rows, &self.points[ring..]);
                 return self.regular(&control, target, out);
             }
             Plan::Split { rows, children, limits, .. } => (rows, children, limits),
@@ -204,8 +204,8 @@ impl Evaluator {
         if single || depth >= MAX_DEPTH {
             let (u, v) = (self.params[target.us.0], self.params[target.vs.0]);
             let corner = if depth >= MAX_DEPTH { exact_corner(u.round(), v.round()) } else { exact_corner(u, v) };
-            if let Some(Limit::Position(rows) | Limit::Smooth(rows)) = corner.and_then(|k| limits.get(k)) {
-                let p = one_product(library.rows(), *rows, 0, &self.points[ring..]);
+            if let Some(row) = corner.and_then(|k| limits.get(k)?.position()) {
+                let p = one_product(library.rows(), row, 0, &self.points[ring..]);
                 self.fill(target, p, out);
                 return;
             }
@@ -213,13 +213,13 @@ impl Evaluator {
         let middle = self.middle(&target);
         let quarters = quarters_of(&target, middle);
         let start = self.points.len();
-        let refined = if quarters.count_ones() > 1 { Some(self.refine(library, *rows, ring)) } else { None };
+        let refined = if quarters.count_ones() > 1 { Some(self.refine(library, rows, ring)) } else { None };
         let marks = (self.points.len(), self.params.len());
         for (k, child) in children.iter().enumerate().filter(|(k, _)| quarters >> k & 1 == 1) {
             let part = self.quarter_target(&target, middle, k);
             let child_ring = match refined {
                 Some(refined) => self.push_child(library, child, refined),
-                None => self.refine_child(library, *rows, child, ring),
+                None => self.refine_child(library, rows, child, ring),
             };
             self.walk(library, child.node, child_ring, depth + 1, part, out);
             self.points.truncate(marks.0);
@@ -237,8 +237,8 @@ impl Evaluator {
             let (x, y) = quarter(k);
             let (i, j) = (if x == 0.0 { 0 } else { n_u - 1 }, if y == 0.0 { 0 } else { n_v - 1 });
             let is_wanted = self.params[target.us.0 + i] == x && self.params[target.vs.0 + j] == y;
-            if let (true, Limit::Position(rows) | Limit::Smooth(rows)) = (is_wanted, limit) {
-                let p = one_product(library.rows(), *rows, 0, &self.points[ring..]);
+            if let (true, Some(row)) = (is_wanted, limit.position()) {
+                let p = one_product(library.rows(), row, 0, &self.points[ring..]);
                 out[target.first + j * target.stride + i] = p;
             }
         }
@@ -345,22 +345,31 @@ impl Evaluator {
     ) -> SurfaceSample {
         let (mut node, mut ring) = (node, self.start_ring(ring));
         let mut scale = f64::from(depth).exp2();
+        // What dicing takes, which comes no further than to the first limit.
+        let mut position = None;
+        let found_at = |sample: SurfaceSample, position: Option<DVec3>| SurfaceSample {
+            position: position.unwrap_or(sample.position),
+            ..sample
+        };
         for depth in depth.. {
             match library.plan(node) {
                 Plan::Regular(rows) => {
-                    let control = control_points(library.rows(), *rows, &self.points[ring..]);
-                    return regular_sample(&control, u, v, scale);
+                    let control = control_points(library.rows(), rows, &self.points[ring..]);
+                    return found_at(regular_sample(&control, u, v, scale), position);
                 }
                 Plan::Split { rows, children, limits, .. } => {
                     let corner =
                         if depth < MAX_DEPTH { exact_corner(u, v) } else { exact_corner(u.round(), v.round()) };
                     let limit = corner.and_then(|k| limits.get(k));
                     if let Some(sample) = limit.and_then(|limit| limit_sample(library, limit, &self.points[ring..])) {
-                        return sample;
+                        return found_at(sample, position);
+                    }
+                    if let (None, Some(Limit::Below(row))) = (position, limit) {
+                        position = Some(one_product(library.rows(), *row, 0, &self.points[ring..]).to_vec());
                     }
                     let (x, y) = (f64::from(u8::from(u >= 0.5)), f64::from(u8::from(v >= 0.5)));
                     let k = exact_corner(x, y).expect("halves are corners");
-                    ring = self.refine_child(library, *rows, &children[k], ring);
+                    ring = self.refine_child(library, rows, &children[k], ring);
                     node = children[k].node;
                     (u, v) = (2.0 * u - x, 2.0 * v - y);
                     scale *= 2.0;
@@ -393,7 +402,7 @@ impl Evaluator {
 
 fn polygon(library: &PlanLibrary, node: NodeId) -> (SparseRows, &[Child]) {
     match library.plan(node) {
-        Plan::Split { rows, children, .. } => (*rows, children),
+        Plan::Split { rows, children, .. } => (rows, children),
         Plan::Regular(_) => unreachable!("a polygon is never regular"),
     }
 }
@@ -426,7 +435,7 @@ pub fn sample_regular(control: &ControlPoints, u: f64, v: f64) -> SurfaceSample 
 fn limit_sample(library: &PlanLibrary, limit: &Limit, points: &[Point]) -> Option<SurfaceSample> {
     let at = |rows: SparseRows, i| one_product(library.rows(), rows, i, points).to_vec();
     match *limit {
-        Limit::Regular => None,
+        Limit::Regular | Limit::Below(_) => None,
         Limit::Position(rows) => Some(SurfaceSample {
             position: at(rows, 0),
             du: DVec3::ZERO,

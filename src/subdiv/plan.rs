@@ -25,15 +25,28 @@ pub struct Child {
 pub enum Limit {
     /// The surface is regular there sooner or later: walk down.
     Regular,
+    /// A position. Tangents, if there are any, are found further down.
+    Below(SparseRows),
     /// A position without tangents.
     Position(SparseRows),
     /// A position (row 0) and tangents along u and v (rows 1 and 2), of which only the directions count.
     Smooth(SparseRows),
 }
 
+impl Limit {
+    /// The row of the position.
+    #[inline(always)]
+    pub fn position(&self) -> Option<SparseRows> {
+        match *self {
+            Limit::Regular => None,
+            Limit::Below(rows) | Limit::Position(rows) | Limit::Smooth(rows) => Some(rows),
+        }
+    }
+}
+
 /// How the surface over a ring is found.
-#[derive(Clone, Debug)]
-pub enum Plan {
+#[derive(Clone, Copy, Debug)]
+pub enum Plan<'a> {
     /// Bicubic B-spline: 16 rows give the control points, u fastest.
     Regular(SparseRows),
     /// One Catmull-Clark step, then the quarters (a polygon of n sides has n children).
@@ -42,12 +55,25 @@ pub enum Plan {
         /// one more ring point.
         rows: SparseRows,
         /// One child per corner. Quarters of quads keep the quad's orientation; children of polygons start at their corner.
-        children: Box<[Child]>,
+        children: &'a [Child],
         /// Limits at the corners; none for polygons, of which only the children are evaluated.
-        limits: Box<[Limit]>,
+        limits: &'a [Limit],
         /// Whether the surface lies in the convex hull of the ring (all weights from here on are non-negative).
         in_hull: bool,
     },
+}
+
+/// A node as it is kept.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    n_points: u32,
+    rows: SparseRows,
+    /// Where its children start, and how many there are; none for regular nodes.
+    children: u32,
+    n_children: u32,
+    /// Where its limits start, four if there are four children.
+    limits: u32,
+    in_hull: bool,
 }
 
 /// All nodes of meshes that share a [`RuleSet`].
@@ -55,8 +81,9 @@ pub enum Plan {
 pub struct PlanLibrary {
     rules: RuleSet,
     rows: RowStore,
-    nodes: Vec<Option<Plan>>,
-    n_points: Vec<u32>,
+    nodes: Vec<Node>,
+    children: Vec<Child>,
+    limits: Vec<Limit>,
     by_key: FxHashMap<Vec<u32>, NodeId>,
     /// Scratch.
     key: Vec<u32>,
@@ -70,7 +97,8 @@ impl PlanLibrary {
             rules,
             rows: RowStore::default(),
             nodes: Vec::new(),
-            n_points: Vec::new(),
+            children: Vec::new(),
+            limits: Vec::new(),
             by_key: FxHashMap::default(),
             key: Vec::new(),
             walker: RingWalker::default(),
@@ -89,13 +117,20 @@ impl PlanLibrary {
 
     /// Number of ring points of a node.
     pub fn n_points(&self, node: NodeId) -> usize {
-        self.n_points[node.0 as usize] as usize
+        self.nodes[node.0 as usize].n_points as usize
     }
 
     /// A node's plan.
     #[inline]
-    pub fn plan(&self, node: NodeId) -> &Plan {
-        self.nodes[node.0 as usize].as_ref().expect("nodes are complete once the library is built")
+    pub fn plan(&self, node: NodeId) -> Plan<'_> {
+        let node = &self.nodes[node.0 as usize];
+        if node.n_children == 0 {
+            return Plan::Regular(node.rows);
+        }
+        let children = &self.children[node.children as usize..][..node.n_children as usize];
+        let n_limits = if children.len() == 4 { 4 } else { 0 };
+        let limits = &self.limits[node.limits as usize..][..n_limits];
+        Plan::Split { rows: node.rows, children, limits, in_hull: node.in_hull }
     }
 
     /// The rows of all nodes.
@@ -117,7 +152,8 @@ impl PlanLibrary {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let keys: usize = self.by_key.keys().map(|k| 4 * k.len() + 40).sum();
-        keys + self.rows.bytes() + self.nodes.iter().flatten().map(plan_bytes).sum::<usize>()
+        let nodes = size_of_val(&self.nodes[..]) + size_of_val(&self.children[..]) + size_of_val(&self.limits[..]);
+        keys + self.rows.bytes() + nodes
     }
 
     /// Forgets how nodes were found, once no more are needed.
@@ -126,6 +162,9 @@ impl PlanLibrary {
         self.key = Vec::new();
         self.walker = RingWalker::default();
         self.rows.seal();
+        self.nodes.shrink_to_fit();
+        self.children.shrink_to_fit();
+        self.limits.shrink_to_fit();
     }
 
     /// The node for a ring, if it is known.
@@ -145,23 +184,23 @@ impl PlanLibrary {
     /// The node for a ring that is new.
     fn make_node(&mut self, ring: &LocalMesh, key: &[u32]) -> NodeId {
         let id = NodeId(self.nodes.len() as u32);
-        self.nodes.push(None);
-        self.n_points.push(ring.n_vertices() as u32);
+        let nothing = self.rows.push([]);
+        let n_points = ring.n_vertices() as u32;
+        self.nodes.push(Node { n_points, rows: nothing, children: 0, n_children: 0, limits: 0, in_hull: true });
         self.by_key.insert(key.to_vec(), id);
         let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
-        let plan = match regular {
-            Some(rows) => Plan::Regular(self.rows.push(rows.iter().flatten())),
+        match regular {
+            Some(rows) => self.nodes[id.0 as usize].rows = self.rows.push(rows.iter().flatten()),
             None => self.split(id, ring),
-        };
-        self.nodes[id.0 as usize] = Some(plan);
+        }
         id
     }
 
-    fn split(&mut self, id: NodeId, ring: &LocalMesh) -> Plan {
+    fn split(&mut self, id: NodeId, ring: &LocalMesh) {
         let n = ring.n_corners();
         let (rows, quarters) = self.quarters(ring);
-        let packed = self.rows.push(&rows);
-        let children: Box<[Child]> = quarters
+        let rows = self.rows.push(&rows);
+        let children: Vec<Child> = quarters
             .into_iter()
             .map(|(node, points)| Child {
                 node: node.unwrap_or_else(|ring| self.node(&ring)),
@@ -169,10 +208,15 @@ impl PlanLibrary {
             })
             .collect();
         let n_limits = if n == 4 { 4 } else { 0 };
-        let limits = (0..n_limits).map(|k| self.limit(id, ring, packed, &children[k as usize], k)).collect();
+        let limits: Vec<Limit> = (0..n_limits).map(|k| self.limit(id, ring, rows, &children[k as usize], k)).collect();
         let semi_sharp = ring.tags.iter().any(|t| !t.semi_sharp.is_empty());
-        let in_hull = !(self.outer_tags() && semi_sharp);
-        Plan::Split { rows: packed, children, limits, in_hull }
+        let node = &mut self.nodes[id.0 as usize];
+        node.rows = rows;
+        node.in_hull = !(self.rules.crease_method == CreaseMethod::Chaikin && semi_sharp);
+        (node.children, node.n_children) = (self.children.len() as u32, n);
+        node.limits = self.limits.len() as u32;
+        self.children.extend(children);
+        self.limits.extend(limits);
     }
 
     /// Rows of the refined points that any quarter uses, and each quarter: its node, or its ring if that is new, and its
@@ -216,32 +260,27 @@ impl PlanLibrary {
         }
     }
 
-    /// A child's limit at its corner, in terms of this ring's points.
+    /// A child's limit at its corner, in terms of this ring's points. Only of its position: to walk down for tangents takes
+    /// longer, but they are asked for one by one, and would be most of what libraries of semi-sharp meshes hold.
     fn pull_back(&mut self, rows: SparseRows, child: &Child, corner: u32) -> Limit {
         let limit = match self.plan(child.node) {
             Plan::Regular(_) => Limit::Regular,
             Plan::Split { limits, .. } => limits[corner as usize],
         };
-        match limit {
-            Limit::Regular => Limit::Regular,
-            Limit::Position(row) => Limit::Position(self.compose(rows, child, row)),
-            Limit::Smooth(three) => Limit::Smooth(self.compose(rows, child, three)),
-        }
+        let Some(position) = limit.position() else { return Limit::Regular };
+        let row = self.compose(rows, child, position);
+        if matches!(limit, Limit::Position(_)) { Limit::Position(row) } else { Limit::Below(row) }
     }
 
-    /// Rows over a child's points, as rows over this ring's.
+    /// The first of a child's rows, as a row over this ring's points.
     fn compose(&mut self, rows: SparseRows, child: &Child, of_child: SparseRows) -> SparseRows {
         let store = &self.rows;
-        let composed: Vec<Row> = (0..of_child.len())
-            .map(|i| {
-                let terms = store.row(of_child, i).into_iter().flat_map(|(c, w)| {
-                    let point = store.index(child.points, c as usize);
-                    store.row(rows, point).into_iter().map(move |(p, x)| (p, x * w))
-                });
-                rules::merge(terms.collect())
-            })
-            .collect();
-        self.rows.push(&composed)
+        let terms = store.row(of_child, 0).into_iter().flat_map(|(c, w)| {
+            let point = store.index(child.points, c as usize);
+            store.row(rows, point).into_iter().map(move |(p, x)| (p, x * w))
+        });
+        let row = rules::merge(terms.collect());
+        self.rows.push([&row])
     }
 
     /// The limit of corner `k` of a node whose quarter there is the node itself: the row of the corner after many steps.
@@ -305,13 +344,4 @@ fn corner_origin(ring: &LocalMesh, origin: Origin) -> Origin {
         }
         other => other,
     }
-}
-
-fn plan_bytes(plan: &Plan) -> usize {
-    size_of::<Option<Plan>>()
-        + size_of::<u32>()
-        + match plan {
-            Plan::Regular(_) => 0,
-            Plan::Split { children, limits, .. } => size_of_val::<[Child]>(children) + size_of_val::<[Limit]>(limits),
-        }
 }

@@ -2,12 +2,13 @@
 //!
 //! Few rows differ in their **weights**, so that each distinct list, a **mask**, is kept once, in f64. Terms are in the order
 //! of their weights: then rows that differ in the order of their columns have one mask. A row is a mask and a list of
-//! columns, two bytes each as long as no ring has more than 65,536 points; equal lists are kept once, too.
+//! columns; equal rows are kept once, and rows that are used together are a list of their numbers. Columns and numbers take
+//! two bytes each as long as there are no more than 65,536 of them; equal lists are kept once, too.
 
 use super::rules::Row;
 use rustc_hash::FxHashMap;
 
-/// Rows of a [`RowStore`], one after the other.
+/// Rows of a [`RowStore`]: a list of their numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SparseRows {
     first: u32,
@@ -47,17 +48,11 @@ impl Span {
     }
 }
 
-/// A row: where its columns start, and its mask, which knows how many there are.
-#[derive(Clone, Copy, Debug)]
+/// A row: where its columns and its weights start, and how many there are.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 struct PackedRow {
     columns: u32,
-    mask: u32,
-}
-
-/// Where a mask's weights are.
-#[derive(Clone, Copy, Debug)]
-struct Mask {
-    first: u32,
+    weights: u32,
     len: u32,
 }
 
@@ -73,31 +68,35 @@ enum Indices {
 #[derive(Clone, Debug)]
 pub struct RowStore {
     rows: Vec<PackedRow>,
-    masks: Vec<Mask>,
     weights: Vec<f64>,
+    /// Columns of rows, numbers of rows, and what else is listed.
     indices: Indices,
-    /// Masks by the bits of their weights, while rows are added.
-    known: FxHashMap<Vec<u64>, u32>,
+    /// Rows that are there, while others are added.
+    known_rows: FxHashMap<PackedRow, u32>,
+    /// Where masks start, by the bits of their weights.
+    known_masks: FxHashMap<Vec<u64>, u32>,
     /// Where lists of indices start, while they are added.
     known_lists: FxHashMap<Vec<u32>, u32>,
     /// Scratch: a row in the order of its weights, its columns, and the bits of its weights.
     sorted: Row,
     list: Vec<u32>,
     bits: Vec<u64>,
+    numbers: Vec<u32>,
 }
 
 impl Default for RowStore {
     fn default() -> Self {
         Self {
             rows: Vec::new(),
-            masks: Vec::new(),
             weights: Vec::new(),
             indices: Indices::Narrow(Vec::new()),
-            known: FxHashMap::default(),
+            known_rows: FxHashMap::default(),
+            known_masks: FxHashMap::default(),
             known_lists: FxHashMap::default(),
             sorted: Row::new(),
             list: Vec::new(),
             bits: Vec::new(),
+            numbers: Vec::new(),
         }
     }
 }
@@ -159,8 +158,9 @@ impl Indices {
 /// Rows and the store that they are in, its indices of a known width: what inner loops take.
 #[derive(Clone, Copy)]
 pub(super) struct RowsView<'s, I> {
+    /// Numbers of the rows.
+    list: &'s [I],
     rows: &'s [PackedRow],
-    masks: &'s [Mask],
     weights: &'s [f64],
     indices: &'s [I],
 }
@@ -169,8 +169,7 @@ impl<'s, I: Index> RowsView<'s, I> {
     /// Columns and weights of row `i`.
     #[inline(always)]
     pub fn row(&self, i: usize) -> (&'s [I], &'s [f64]) {
-        let PackedRow { columns, mask } = self.rows[i];
-        let Mask { first, len } = self.masks[mask as usize];
+        let PackedRow { columns, weights: first, len } = self.rows[self.list[i].idx()];
         let (columns, first, len) = (columns as usize, first as usize, len as usize);
         (&self.indices[columns..columns + len], &self.weights[first..first + len])
     }
@@ -209,18 +208,27 @@ pub(super) enum Width<'s> {
 impl RowStore {
     /// Adds rows.
     pub fn push<'a>(&mut self, rows: impl IntoIterator<Item = &'a Row>) -> SparseRows {
-        let first = self.rows.len() as u32;
-        let mut sorted = std::mem::take(&mut self.sorted);
+        let (mut sorted, mut numbers) = (std::mem::take(&mut self.sorted), std::mem::take(&mut self.numbers));
+        numbers.clear();
         for row in rows {
             sorted.clear();
             sorted.extend_from_slice(row);
             sorted.sort_unstable_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-            let columns = self.list_start(sorted.iter().map(|&(column, _)| column));
-            let packed = PackedRow { columns, mask: self.mask(&sorted) };
-            self.rows.push(packed);
+            numbers.push(self.row_number(&sorted));
         }
-        self.sorted = sorted;
-        SparseRows { first, len: self.rows.len() as u32 - first }
+        let list = self.push_indices(&numbers);
+        (self.sorted, self.numbers) = (sorted, numbers);
+        SparseRows { first: list.first, len: list.len }
+    }
+
+    fn row_number(&mut self, sorted: &Row) -> u32 {
+        let columns = self.list_start(sorted.iter().map(|&(column, _)| column));
+        let row = PackedRow { columns, weights: self.mask(sorted), len: sorted.len() as u32 };
+        let rows = &mut self.rows;
+        *self.known_rows.entry(row).or_insert_with(|| {
+            rows.push(row);
+            rows.len() as u32 - 1
+        })
     }
 
     /// Adds a list of indices.
@@ -241,17 +249,17 @@ impl RowStore {
         start
     }
 
+    /// Where the weights of a row start.
     fn mask(&mut self, row: &Row) -> u32 {
         self.bits.clear();
         self.bits.extend(row.iter().map(|&(_, w)| w.to_bits()));
-        if let Some(&mask) = self.known.get(&self.bits) {
-            return mask;
+        if let Some(&start) = self.known_masks.get(&self.bits) {
+            return start;
         }
-        let mask = self.masks.len() as u32;
-        self.masks.push(Mask { first: self.weights.len() as u32, len: row.len() as u32 });
+        let start = self.weights.len() as u32;
         self.weights.extend(row.iter().map(|&(_, w)| w));
-        self.known.insert(self.bits.clone(), mask);
-        mask
+        self.known_masks.insert(self.bits.clone(), start);
+        start
     }
 
     /// Row `i` of some rows.
@@ -279,8 +287,8 @@ impl RowStore {
     #[inline(always)]
     pub(super) fn view<'s, I>(&'s self, rows: SparseRows, indices: &'s [I]) -> RowsView<'s, I> {
         RowsView {
-            rows: &self.rows[rows.first as usize..][..rows.len()],
-            masks: &self.masks,
+            list: &indices[rows.first as usize..][..rows.len()],
+            rows: &self.rows,
             weights: &self.weights,
             indices,
         }
@@ -303,10 +311,9 @@ impl RowStore {
 
     /// Drops what only adding needs.
     pub fn seal(&mut self) {
-        (self.known, self.known_lists) = Default::default();
-        (self.sorted, self.list, self.bits) = Default::default();
+        (self.known_rows, self.known_masks, self.known_lists) = Default::default();
+        (self.sorted, self.list, self.bits, self.numbers) = Default::default();
         self.rows.shrink_to_fit();
-        self.masks.shrink_to_fit();
         self.weights.shrink_to_fit();
         match &mut self.indices {
             Indices::Narrow(indices) => indices.shrink_to_fit(),
@@ -316,12 +323,12 @@ impl RowStore {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let known: usize = self.known.keys().map(|k| 8 * k.len() + 40).sum();
+        let known_masks: usize = self.known_masks.keys().map(|k| 8 * k.len() + 40).sum();
         let known_lists: usize = self.known_lists.keys().map(|k| 4 * k.len() + 40).sum();
-        known
+        known_masks
             + known_lists
+            + 20 * self.known_rows.capacity()
             + size_of_val(&self.rows[..])
-            + size_of_val(&self.masks[..])
             + size_of_val(&self.weights[..])
             + self.indices.bytes()
     }
@@ -337,8 +344,9 @@ mod tests {
         let few: Vec<Row> = vec![vec![(3, 0.25), (1, 0.75)], vec![(3, 0.25), (2, 0.75)], vec![]];
         let narrow = store.push(&few);
         store.push([&vec![(1, 0.75), (3, 0.25)]]);
-        assert_eq!(store.masks.len(), 2, "equal weights are kept once");
-        assert_eq!(store.indices.len(), 4, "equal lists are kept once");
+        assert_eq!(store.weights.len(), 2, "equal weights are kept once");
+        assert_eq!(store.rows.len(), 3, "equal rows are kept once");
+        assert_eq!(store.indices.len(), 4 + 3 + 1, "equal lists are kept once");
         let wide = store.push([&vec![(70_000, 1.5)]]);
         let list = store.push_indices(&[5, 100_000]);
         for (i, row) in few.iter().enumerate() {
