@@ -29,8 +29,8 @@ const REACH_MARGIN: f64 = 256.0;
 const SHARE_OF_SURFACE: f64 = 0.35;
 const SHARE_OF_TREE: f64 = 0.35;
 
-/// Bytes of the tree over a mesh's patches, for each: a node of 224 bytes for every four to five of them.
-const TREE_BYTES_PER_PATCH: usize = 50;
+/// Bytes of the tree over a mesh's patches, for each: a node of 224 bytes for every six to seven of them.
+const TREE_BYTES_PER_PATCH: usize = 38;
 
 /// Bytes of the tree for each slot of the cache.
 const BYTES_PER_SLOT: usize = 28;

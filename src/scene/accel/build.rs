@@ -1,5 +1,6 @@
-//! Boxes to wide tree: `parts.rs` divides them into parts, obvhs clusters each part into a binary tree, `collapse.rs` makes
-//! that wide, and the trees of all parts become the lanes of one more tree.
+//! Boxes to wide tree: `parts.rs` divides them into parts, `groups.rs` puts eight neighbours each into a node, obvhs clusters
+//! the groups of a part into a binary tree, `collapse.rs` makes that wide, and the trees of all parts become the lanes of
+//! one more tree.
 //!
 //! ```text
 //!   nodes   ┌─────────────┬──────────────────┬──────────────────┬─ ..
@@ -13,7 +14,8 @@
 //! then gets the true boxes back. Across the longest axis centres stay where they are, so that what is flat stays flat: the
 //! order along the space-filling curve would be that of noise otherwise.
 
-use super::collapse::{Collapse, parents_first};
+use super::collapse::{Collapse, Lane, parents_first};
+use super::groups::{Group, groups};
 use super::parts::divide;
 use super::{EMPTY, LANES, LEAF, TopLevel, WideNode};
 use crate::math::Bounds;
@@ -31,7 +33,7 @@ use std::time::Duration;
 pub const BUILD_BYTES_PER_PATCH: usize = 8;
 
 /// Fewer than there are as a rule: room for the nodes of large trees is set aside by it.
-const PATCHES_PER_NODE: usize = 3;
+const PATCHES_PER_NODE: usize = 5;
 
 /// How far a box is moved at most to either side, as twice the share of its size: enough to break ties, too little to change clusters.
 const JITTER: f32 = 0.02;
@@ -56,10 +58,10 @@ impl WideNode {
         refs: [EMPTY; LANES],
     };
 
-    fn set(&mut self, lane: usize, aabb: &Aabb, reference: u32) {
+    fn set(&mut self, lane: usize, bounds: &Bounds, reference: u32) {
         for k in 0..3 {
-            self.planes[k][lane] = aabb.min[k];
-            self.planes[k + 3][lane] = aabb.max[k];
+            self.planes[k][lane] = bounds.min[k];
+            self.planes[k + 3][lane] = bounds.max[k];
         }
         self.refs[lane] = reference;
     }
@@ -89,13 +91,13 @@ impl TopLevel {
 
     /// The tree over some of `boxes`, at least one, whose leaves are `members`.
     fn of_part(boxes: &[Bounds], members: &[u32]) -> Self {
-        let moved = without_ties(boxes, members);
+        let groups = groups(boxes, members);
+        let moved = without_ties(&groups);
         let parameters = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::very_fast_build() };
         let mut binary = build_bvh2(&moved, parameters, &mut Duration::default());
-        binary.primitive_indices.iter_mut().for_each(|i| *i = members[*i as usize]);
         let order = parents_first(&binary);
-        restore_boxes(&mut binary, &order, boxes);
-        emit(&binary, &Collapse::new(&binary, &order))
+        restore_boxes(&mut binary, &order, &groups);
+        emit(&Collapse::new(&binary, &order, &groups, boxes), boxes)
     }
 }
 
@@ -150,13 +152,13 @@ fn aabb(b: &Bounds) -> Aabb {
     Aabb::new(Vec3A::from(b.min), Vec3A::from(b.max))
 }
 
-/// The boxes of `members`, each moved and widened by amounts that depend on its place.
-fn without_ties(boxes: &[Bounds], members: &[u32]) -> Vec<Aabb> {
-    let all = members.iter().map(|&i| boxes[i as usize]).fold(Bounds::EMPTY, Bounds::union);
+/// The boxes of groups, each moved and widened by amounts that depend on its place.
+fn without_ties(groups: &[Group]) -> Vec<Aabb> {
+    let all = groups.iter().map(|g| g.bounds).fold(Bounds::EMPTY, Bounds::union);
     let size = all.max - all.min;
     let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).expect("three axes");
-    let changed = |(i, &member): (usize, &u32)| {
-        let b = boxes[member as usize];
+    let changed = |(i, group): (usize, &Group)| {
+        let b = group.bounds;
         let random = |salt: u32| {
             let mixed = (i as u32 ^ salt).wrapping_mul(0x9e37_79b9).rotate_left(15).wrapping_mul(0x85eb_ca6b);
             (mixed >> 8) as f32 / (1 << 24) as f32
@@ -166,17 +168,17 @@ fn without_ties(boxes: &[Bounds], members: &[u32]) -> Vec<Aabb> {
         let wider = (WIDENING_STEPS * random(0x5bd1_e995)).ceil();
         Aabb::new(Vec3A::from(b.min + by - wider), Vec3A::from(b.max + by + wider))
     };
-    members.iter().enumerate().map(changed).collect()
+    groups.iter().enumerate().map(changed).collect()
 }
 
 /// Gives every node the box of what is below it.
-fn restore_boxes(binary: &mut Bvh2, order: &[u32], patches: &[Bounds]) {
+fn restore_boxes(binary: &mut Bvh2, order: &[u32], groups: &[Group]) {
     for &n in order.iter().rev() {
         let node = &binary.nodes[n as usize];
         let first = node.first_index as usize;
         let of = |i: usize| *binary.nodes[i].aabb();
         let below = if node.is_leaf() {
-            aabb(&patches[binary.primitive_indices[first] as usize])
+            aabb(&groups[binary.primitive_indices[first] as usize].bounds)
         } else {
             of(first).union(&of(first + 1))
         };
@@ -192,22 +194,24 @@ struct Pending {
 }
 
 /// Writes the wide tree from the root down; children of a node are neighbours.
-fn emit(binary: &Bvh2, collapse: &Collapse) -> TopLevel {
+fn emit(collapse: &Collapse<'_>, boxes: &[Bounds]) -> TopLevel {
     let mut nodes = vec![WideNode::NOTHING];
     let mut pending = vec![Pending { node: 0, binary: 0, depth: 1 }];
     let mut deepest = 1;
-    while let Some(Pending { node, binary: below, depth }) = pending.pop() {
+    let mut lanes = Vec::with_capacity(LANES);
+    while let Some(Pending { node, binary, depth }) = pending.pop() {
         deepest = deepest.max(depth);
-        for (lane, child) in collapse.lanes(binary, below).into_iter().enumerate() {
-            let source = &binary.nodes[child];
-            let reference = if source.is_leaf() {
-                LEAF | binary.primitive_indices[source.first_index as usize]
-            } else {
-                nodes.push(WideNode::NOTHING);
-                pending.push(Pending { node: nodes.len() - 1, binary: child, depth: depth + 1 });
-                (nodes.len() - 1) as u32
+        collapse.lanes(binary, &mut lanes);
+        for (lane, child) in lanes.iter().enumerate() {
+            let (bounds, reference) = match *child {
+                Lane::Box(number) => (boxes[number as usize], LEAF | number),
+                Lane::Node(binary) => {
+                    nodes.push(WideNode::NOTHING);
+                    pending.push(Pending { node: nodes.len() - 1, binary, depth: depth + 1 });
+                    (collapse.bounds(binary), (nodes.len() - 1) as u32)
+                }
             };
-            nodes[node].set(lane, source.aabb(), reference);
+            nodes[node].set(lane, &bounds, reference);
         }
     }
     nodes.shrink_to_fit();

@@ -22,6 +22,7 @@
 
 mod build;
 mod collapse;
+mod groups;
 mod parts;
 mod traverse;
 mod visit;

@@ -1,0 +1,184 @@
+//! Putting boxes into **groups** of eight neighbours: the lanes of one node each.
+//!
+//! A tree made wide from a binary one has four or five children a node, since most subtrees of a binary tree have no eight
+//! leaves. So boxes are divided from the top, every time at a multiple of eight of them, by the least surface-area cost:
+//! all groups but the last are full then, and what is above them has an eighth of the boxes.
+
+use super::LANES;
+use crate::math::Bounds;
+use glam::Vec3;
+
+/// Boxes of which all three orders are compared; of more, slabs along the longest axis are.
+const MOST_SORTED: usize = 64;
+
+/// Slabs of centres that are compared.
+const N_BINS: usize = 16;
+
+/// Neither side of a division in slabs gets less than this share.
+const LEAST_SHARE: usize = 8;
+
+/// A box to be grouped, and its number.
+#[derive(Clone, Copy)]
+struct Item {
+    bounds: Bounds,
+    number: u32,
+}
+
+impl Item {
+    /// Twice the centre, which is as good for comparisons.
+    fn center(&self) -> Vec3 {
+        self.bounds.min + self.bounds.max
+    }
+}
+
+/// Up to eight boxes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Group {
+    pub bounds: Bounds,
+    /// Numbers of the boxes, the first `len` of these.
+    numbers: [u32; LANES],
+    len: usize,
+}
+
+impl Group {
+    pub fn numbers(&self) -> &[u32] {
+        &self.numbers[..self.len]
+    }
+}
+
+/// The groups of some of `boxes`.
+pub(super) fn groups(boxes: &[Bounds], members: &[u32]) -> Vec<Group> {
+    let mut items: Vec<Item> = members.iter().map(|&number| Item { bounds: boxes[number as usize], number }).collect();
+    let mut groups = Vec::with_capacity(items.len().div_ceil(LANES));
+    divide(&mut items, &mut groups);
+    groups
+}
+
+fn divide(items: &mut [Item], groups: &mut Vec<Group>) {
+    if items.len() <= LANES {
+        let mut numbers = [0; LANES];
+        numbers.iter_mut().zip(&*items).for_each(|(number, item)| *number = item.number);
+        groups.push(Group { bounds: union(items), numbers, len: items.len() });
+        return;
+    }
+    let middle = if items.len() <= MOST_SORTED { split_sorted(items) } else { split_slabs(items) };
+    let (low, high) = items.split_at_mut(middle);
+    divide(low, groups);
+    divide(high, groups);
+}
+
+fn union(items: &[Item]) -> Bounds {
+    items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds))
+}
+
+pub(super) fn half_area(b: &Bounds) -> f32 {
+    let size = (b.max - b.min).max(Vec3::ZERO);
+    size.x * size.y + size.y * size.z + size.z * size.x
+}
+
+fn sort(items: &mut [Item], axis: usize) {
+    items.sort_unstable_by(|a, b| a.center()[axis].total_cmp(&b.center()[axis]).then(a.number.cmp(&b.number)));
+}
+
+/// Sorts along the axis of the cheapest division; returns where it is.
+fn split_sorted(items: &mut [Item]) -> usize {
+    let mut best = (f32::INFINITY, 0, LANES);
+    for axis in 0..3 {
+        sort(items, axis);
+        let (cost, middle) = cheapest(items);
+        if cost < best.0 {
+            best = (cost, axis, middle);
+        }
+    }
+    if best.1 != 2 {
+        sort(items, best.1);
+    }
+    best.2
+}
+
+/// The cheapest division of sorted items that leaves one group that is not full at most: its cost and place.
+fn cheapest(items: &[Item]) -> (f32, usize) {
+    let n = items.len();
+    let mut above = [0.0; MOST_SORTED];
+    let mut bounds = Bounds::EMPTY;
+    for (i, item) in items.iter().enumerate().rev() {
+        bounds = bounds.union(item.bounds);
+        above[i] = half_area(&bounds);
+    }
+    bounds = Bounds::EMPTY;
+    let mut best = (f32::INFINITY, LANES);
+    for middle in 1..n {
+        bounds = bounds.union(items[middle - 1].bounds);
+        if middle % LANES == 0 || (n - middle) % LANES == 0 {
+            let n_nodes = |n: usize| n.div_ceil(LANES) as f32;
+            let cost = half_area(&bounds) * n_nodes(middle) + above[middle] * n_nodes(n - middle);
+            if cost < best.0 {
+                best = (cost, middle);
+            }
+        }
+    }
+    best
+}
+
+/// Puts the items below the cheapest slab boundary first, or rather a multiple of eight.
+fn split_slabs(items: &mut [Item]) -> usize {
+    let n = items.len();
+    let (low, high) = items.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), item| {
+        (low.min(item.center()), high.max(item.center()))
+    });
+    let extent = high - low;
+    let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).expect("three axes");
+    let scale = N_BINS as f32 / extent[axis].max(f32::MIN_POSITIVE);
+    let bin = |item: &Item| (((item.center()[axis] - low[axis]) * scale) as usize).min(N_BINS - 1);
+    let least = n / LEAST_SHARE;
+    let near = best_boundary(items, bin).unwrap_or(n / 2).clamp(least, n - least);
+    let middle = (near + LANES / 2) / LANES * LANES;
+    let order = |a: &Item, b: &Item| a.center()[axis].total_cmp(&b.center()[axis]).then(a.number.cmp(&b.number));
+    items.select_nth_unstable_by(middle, order);
+    middle
+}
+
+/// How many items are below the cheapest boundary between slabs, if there is any.
+fn best_boundary(items: &[Item], bin: impl Fn(&Item) -> usize) -> Option<usize> {
+    let mut slabs = [(Bounds::EMPTY, 0usize); N_BINS];
+    for item in items {
+        let slab = &mut slabs[bin(item)];
+        *slab = (slab.0.union(item.bounds), slab.1 + 1);
+    }
+    let mut above = [0.0; N_BINS];
+    let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+    for (i, slab) in slabs.iter().enumerate().rev() {
+        (bounds, count) = (bounds.union(slab.0), count + slab.1);
+        above[i] = half_area(&bounds) * count as f32;
+    }
+    (bounds, count) = (Bounds::EMPTY, 0);
+    let mut best = (f32::INFINITY, None);
+    for boundary in 1..N_BINS {
+        (bounds, count) = (bounds.union(slabs[boundary - 1].0), count + slabs[boundary - 1].1);
+        let cost = half_area(&bounds) * count as f32 + above[boundary];
+        if count > 0 && count < items.len() && cost < best.0 {
+            best = (cost, Some(count));
+        }
+    }
+    best.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_box_is_in_one_group_and_all_groups_but_one_are_full() {
+        let at = |i: u64| Vec3::new((i * 7919 % 1000) as f32, (i * 104_729 % 777) as f32, (i % 13) as f32);
+        let scattered: Vec<Bounds> = (0..4001).map(|i| Bounds { min: at(i), max: at(i) + 1.0 }).collect();
+        let equal = vec![Bounds { min: Vec3::ONE, max: Vec3::ONE }; 1001];
+        for boxes in [&scattered[..], &scattered[..63], &scattered[..9], &scattered[..1], &equal] {
+            let members: Vec<u32> = (0..boxes.len() as u32).collect();
+            let groups = groups(boxes, &members);
+            assert_eq!(groups.len(), boxes.len().div_ceil(LANES));
+            let mut all: Vec<u32> = groups.iter().flat_map(|g| g.numbers()).copied().collect();
+            all.sort_unstable();
+            assert_eq!(all, members);
+        }
+    }
+}
