@@ -11,7 +11,7 @@ use crate::grid::MAX_CELLS;
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Bounds, DBounds};
 use crate::mesh::{ControlMesh, TexCoords};
-use crate::parallel::{ITEMS_PER_TASK, for_ranges};
+use crate::parallel::{for_each, for_ranges};
 use crate::subdiv::dice::LATTICE_SHIFT;
 use crate::subdiv::{Dicer, PatchRates, Surface};
 use glam::{DAffine3, DMat3, DVec3};
@@ -20,6 +20,9 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// Quarters of an irregular patch that its box looks into: more make the box tighter, and building slower.
 const BOX_DEPTH: u32 = 3;
+
+/// Patches whose boxes a thread finds before it asks for more.
+const BOXES_PER_TASK: usize = 512;
 
 /// Lattice steps around a mesh's box within which a ray is worth a look: rays are rounded to f32 near the mesh, which
 /// moves them by less than 48 steps.
@@ -354,17 +357,17 @@ fn patch_boxes(
 ) -> Vec<Bounds> {
     let n_done = AtomicUsize::new(0);
     let mut boxes = vec![Bounds::EMPTY; patches.len()];
-    let chunks: Vec<_> = boxes.chunks_mut(ITEMS_PER_TASK).map(parking_lot::Mutex::new).collect();
-    for_ranges(patches.len(), n_threads, |range| {
+    let tasks: Vec<_> = boxes.chunks_mut(BOXES_PER_TASK).zip(patches.chunks(BOXES_PER_TASK)).map(Mutex::new).collect();
+    for_each(&tasks, n_threads, |_, task| {
         let mut dicer = Dicer::default();
-        let mut chunk = chunks[range.start / ITEMS_PER_TASK].lock();
-        for (b, patch) in chunk.iter_mut().zip(&patches[range]) {
+        let (boxes, patches_of_task) = &mut *task.lock();
+        for (b, patch) in boxes.iter_mut().zip(patches_of_task.iter()) {
             *b = dicer.patch_bounds(surface, *patch, BOX_DEPTH);
         }
-        let n_done = n_done.fetch_add(chunk.len(), Ordering::Relaxed) + chunk.len();
+        let n_done = n_done.fetch_add(boxes.len(), Ordering::Relaxed) + boxes.len();
         progress(n_done as f64 / patches.len() as f64);
     });
-    drop(chunks);
+    drop(tasks);
     boxes
 }
 

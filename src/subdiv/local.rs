@@ -3,8 +3,7 @@
 //! Face 0 is the target and half-edge 0 its first corner. Only the target's corners know all their faces (up to
 //! infinitely sharp edges, which nothing crosses); that is enough to refine the target and the rings of its quarters.
 
-use crate::topology::{Fan, HalfEdges, NONE, VertexTags, fan};
-use rustc_hash::FxHashMap;
+use crate::topology::{Fan, HalfEdges, NONE, VertexTags, fan, fan_size};
 
 /// The ring of a target face.
 #[derive(Clone, Debug, Default)]
@@ -100,6 +99,12 @@ impl LocalMesh {
         &self.tags[self.vertex[h as usize] as usize]
     }
 
+    /// Number of faces in the [`fan`](Self::fan) of a corner, and whether it is closed.
+    pub fn fan_size(&self, h: u32) -> (usize, bool) {
+        let cut = self.tags_at(h).n_infinite >= 2;
+        fan_size(self, h, |e| is_border(self, e, cut))
+    }
+
     /// The faces around corner `h` of the target, up to infinitely sharp edges that bound its sector.
     pub fn fan(&self, h: u32) -> Fan {
         let cut = self.tags_at(h).n_infinite >= 2;
@@ -160,6 +165,7 @@ pub fn extract_whole<M: HalfEdges + ?Sized>(
     spokes: impl Fn(u32) -> Vec<u32>,
 ) -> Extracted {
     let mut walker = RingWalker::default();
+    walker.clear();
     walker.add_face(mesh, first);
     let (start, n_corners) = mesh.face_corners(mesh.face(first));
     let corners: Vec<u32> = (0..n_corners).map(|k| start + (first - start + k) % n_corners).collect();
@@ -171,50 +177,73 @@ pub fn extract_whole<M: HalfEdges + ?Sized>(
     walker.ring
 }
 
-/// Values that are looked up one after the other, longer lists by a table.
-const LONGEST_SCAN: usize = 64;
-
-/// Numbers for values, in the order in which they come first.
+/// Numbers for values, in the order in which they come first. It is cleared and filled again and again, so entries of its
+/// table count only with the stamp of the present filling.
 #[derive(Debug, Default)]
 struct Numbering {
     values: Vec<u32>,
-    /// Of all values, once there are more than [`LONGEST_SCAN`].
-    table: FxHashMap<u32, u32>,
+    /// Stamps and numbers, at the hash of the value or in the next free place; twice as many as there are values, or more.
+    table: Vec<[u32; 2]>,
+    stamp: u32,
 }
+
+/// Room for the vertices of an ordinary ring.
+const LEAST_TABLE: usize = 64;
 
 impl Numbering {
     fn clear(&mut self) {
         self.values.clear();
+        self.stamp = self.stamp.wrapping_add(1);
+        if self.stamp == 0 || self.table.is_empty() {
+            self.make_table(LEAST_TABLE);
+        }
+    }
+
+    fn make_table(&mut self, len: usize) {
         self.table.clear();
+        self.table.resize(len, [0; 2]);
+        self.stamp = 1;
+        for number in 0..self.values.len() {
+            let place = self.place(self.values[number]);
+            self.table[place] = [self.stamp, number as u32];
+        }
+    }
+
+    /// Where a value is, or would be.
+    #[inline(always)]
+    fn place(&self, value: u32) -> usize {
+        let mask = self.table.len() - 1;
+        let mut place = (value.wrapping_mul(0x9e37_79b9) >> 16) as usize & mask;
+        loop {
+            let [stamp, number] = self.table[place];
+            if stamp != self.stamp || self.values[number as usize] == value {
+                return place;
+            }
+            place = (place + 1) & mask;
+        }
     }
 
     #[inline(always)]
     fn find(&self, value: u32) -> Option<u32> {
-        if self.values.len() > LONGEST_SCAN {
-            return self.table.get(&value).copied();
-        }
-        self.values.iter().position(|&v| v == value).map(|i| i as u32)
+        let [stamp, number] = self.table[self.place(value)];
+        (stamp == self.stamp).then_some(number)
     }
 
     /// The value's number, and whether it is new.
     #[inline(always)]
     fn number(&mut self, value: u32) -> (u32, bool) {
-        if let Some(known) = self.find(value) {
-            return (known, false);
+        let place = self.place(value);
+        let [stamp, number] = self.table[place];
+        if stamp == self.stamp {
+            return (number, false);
         }
         let number = self.values.len() as u32;
         self.values.push(value);
-        if self.values.len() > LONGEST_SCAN {
-            self.note(number);
+        self.table[place] = [self.stamp, number];
+        if 2 * self.values.len() > self.table.len() {
+            self.make_table(2 * self.table.len());
         }
         (number, true)
-    }
-
-    fn note(&mut self, number: u32) {
-        let from = if self.table.is_empty() { 0 } else { number };
-        for n in from..=number {
-            self.table.insert(self.values[n as usize], n);
-        }
     }
 }
 

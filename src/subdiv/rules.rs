@@ -5,7 +5,7 @@
 
 use super::local::LocalMesh;
 use crate::mesh::{CreaseMethod, TriangleRule};
-use crate::topology::{Fan, HalfEdges, NONE, VertexTags};
+use crate::topology::{HalfEdges, NONE, VertexTags};
 use std::f64::consts::PI;
 
 /// A weighted sum of points; points may repeat until [`merge`] adds them up.
@@ -96,12 +96,18 @@ fn mask(sharpness: f32, n_sharp: usize) -> Mask {
     }
 }
 
-/// The mean of a face's vertices.
+/// Adds the mean of a face's vertices, times a weight.
 ///
 /// That of a polygon that is the target counts as a point itself, the one after the ring's points: written out, it would
 /// make the rows of a polygon's quarters as long as the polygon has corners.
-pub fn face_point(mesh: &LocalMesh, face: u32) -> Row {
-    if face == 0 && mesh.n_corners() != 4 { vec![(mesh.n_vertices() as u32, 1.0)] } else { mean(mesh, face) }
+fn add_face_point(row: &mut Row, mesh: &LocalMesh, face: u32, weight: f64) {
+    if face == 0 && mesh.n_corners() != 4 {
+        row.push((mesh.n_vertices() as u32, weight));
+    } else {
+        let (start, n) = mesh.face_corners(face);
+        let each = 1.0 / f64::from(n) * weight;
+        row.extend((start..start + n).map(|h| (mesh.vertex[h as usize], each)));
+    }
 }
 
 fn mean(mesh: &LocalMesh, face: u32) -> Row {
@@ -118,10 +124,10 @@ pub fn halves(rules: &RuleSet, mesh: &LocalMesh, h: u32) -> [f32; 2] {
 
 /// The new point of an edge.
 pub fn edge_point(rules: &RuleSet, mesh: &LocalMesh, h: u32) -> Row {
-    let middle: Row = vec![(mesh.vertex(h), 0.5), (mesh.vertex(mesh.next(h)), 0.5)];
+    let ends = [mesh.vertex(h), mesh.vertex(mesh.next(h))];
     let s = mesh.edge_sharpness(h);
     if s == f32::INFINITY || (s > 0.0 && halves(rules, mesh, h).iter().all(|&half| half > 0.0)) {
-        return merge(middle);
+        return merge(ends.map(|v| (v, 0.5)).to_vec());
     }
     let faces = [mesh.face(h), mesh.face(mesh.twin(h))];
     let sizes = faces.map(|f| mesh.face_corners(f).1);
@@ -133,10 +139,10 @@ pub fn edge_point(rules: &RuleSet, mesh: &LocalMesh, h: u32) -> Row {
         _ => 0.25,
     };
     let blend = 1.0 - f64::from(s);
-    let mut row: Row = scaled(&middle, f64::from(s) + blend * (1.0 - 2.0 * weight)).collect();
-    for f in faces {
-        row.extend(scaled(&face_point(mesh, f), blend * weight));
-    }
+    let of_end = 0.5 * (f64::from(s) + blend * (1.0 - 2.0 * weight));
+    let mut row = Row::with_capacity(2 + sizes[0] as usize + sizes[1] as usize);
+    row.extend(ends.map(|v| (v, of_end)));
+    faces.into_iter().for_each(|f| add_face_point(&mut row, mesh, f, blend * weight));
     merge(row)
 }
 
@@ -160,7 +166,10 @@ pub fn vertex_point(rules: &RuleSet, mesh: &LocalMesh, h: u32) -> Row {
         }
     };
     let before = row_of(mask_before, &|e| mesh.edge_sharpness(e) > 0.0);
-    if mask_before == Mask::Smooth || mask_before == mask_after {
+    if mask_before == Mask::Smooth {
+        return before;
+    }
+    if mask_before == mask_after {
         return merge(before);
     }
     let decayed = |e: u32| decay_edge(rules.crease_method, mesh.edge_sharpness(e), &tags.semi_sharp);
@@ -202,12 +211,11 @@ fn transition_weight(rules: &RuleSet, tags: &VertexTags, after: &VertexTags) -> 
 
 fn smooth_vertex(mesh: &LocalMesh, v: u32, spokes: &[u32], edges: &[(u32, u32)]) -> Row {
     let n = spokes.len() as f64;
-    let mut row: Row = vec![(v, (n - 2.0) / n)];
+    let mut row = Row::with_capacity(1 + 5 * spokes.len());
+    row.push((v, (n - 2.0) / n));
     row.extend(edges.iter().map(|e| (e.1, 1.0 / (n * n))));
-    for &h in spokes {
-        row.extend(scaled(&face_point(mesh, mesh.face(h)), 1.0 / (n * n)));
-    }
-    row
+    spokes.iter().for_each(|&h| add_face_point(&mut row, mesh, mesh.face(h), 1.0 / (n * n)));
+    merge(row)
 }
 
 /// What is known of the limit at a corner of the target.
@@ -317,21 +325,20 @@ fn is_corner_forever(tags: &VertexTags) -> bool {
 }
 
 /// Whether the fan's borders are the two sharp edges of its vertex; at a fin, one edge may be both borders.
-fn is_bounded_by_crease(mesh: &LocalMesh, h: u32, fan: &Fan) -> bool {
+fn is_bounded_by_crease(mesh: &LocalMesh, h: u32) -> bool {
     mesh.crease_ends(h).is_none_or(|ends| {
-        let edges = mesh.fan_edges(fan);
+        let edges = mesh.fan_edges(&mesh.fan(h));
         ends.iter().all(|end| edges.iter().any(|e| e.1 == *end && mesh.edge_sharpness(e.0) == f32::INFINITY))
     })
 }
 
 fn is_regular_corner(mesh: &LocalMesh, h: u32) -> bool {
     let tags = mesh.tags_at(h);
-    let fan = mesh.fan(h);
-    match (fan.spokes.len(), fan.closed) {
+    match mesh.fan_size(h) {
         (1, false) => is_corner_forever(tags),
         (2, false) => {
             let smooth_else = tags.sharpness == 0.0 && tags.n_infinite == 2 && tags.semi_sharp.is_empty();
-            smooth_else && is_bounded_by_crease(mesh, h, &fan)
+            smooth_else && is_bounded_by_crease(mesh, h)
         }
         (4, true) => tags.sharpness == 0.0 && tags.n_infinite == 0 && tags.semi_sharp.is_empty(),
         _ => false,
@@ -559,7 +566,7 @@ fn refined_tags(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> VertexTags
     }
 }
 
-/// The row of a refined vertex, see [`face_point`] for its columns; vertices must be corners of the target.
+/// The row of a refined vertex, see [`add_face_point`] for its columns; vertices must be corners of the target.
 pub fn refined_row(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> Row {
     match origin {
         Origin::Vertex(h) => vertex_point(rules, mesh, h),

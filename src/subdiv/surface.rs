@@ -428,7 +428,7 @@ fn is_quad(topology: &Topology, h: u32) -> bool {
 }
 
 /// Faces a thread plans before it asks for more.
-const FACES_PER_TASK: usize = 4096;
+const FACES_PER_TASK: usize = 512;
 
 /// The plan of every visible face. Node numbers depend on which thread comes first; what they mean does not.
 fn plan_faces(topology: &Topology, rules: RuleSet, n_threads: usize, sites: &EditSites) -> (PlanLibrary, Vec<NodeId>) {

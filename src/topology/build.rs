@@ -217,7 +217,7 @@ impl Topology {
                 if n == 0 || edges_at.contains_key(&v.0) {
                     continue;
                 }
-                match fan_size(self, h as u32) {
+                match fan_size(self, h as u32, |e| self.twin[e as usize] == NONE) {
                     (1, false) if n == 1 => found.lock().0.push(v.0),
                     (size, _) if size != n as usize => found.lock().1.push(v.0),
                     _ => {}
@@ -454,7 +454,7 @@ impl Topology {
     fn walk_tags(&self, h: u32) -> VertexTags {
         let v = self.vertex[h as usize].0;
         if !self.is_tagged(v) {
-            let (_, closed) = fan_size(self, h);
+            let (_, closed) = fan_size(self, h, |e| self.twin[e as usize] == NONE);
             return VertexTags { n_infinite: if closed { 0 } else { 2 }, ..Default::default() };
         }
         let fan = fan(self, h, |h| self.twin[h as usize] == NONE);

@@ -74,7 +74,9 @@ pub struct Fan {
 
 /// The sector of `h`'s face at the vertex where `h` starts, bounded by edges for which `is_border` holds.
 pub fn fan<M: HalfEdges + ?Sized>(mesh: &M, h: u32, is_border: impl Fn(u32) -> bool) -> Fan {
-    let mut spokes = vec![h];
+    // Few vertices have more edges.
+    let mut spokes = Vec::with_capacity(8);
+    spokes.push(h);
     loop {
         let arriving = mesh.prev(*spokes.last().expect("a fan has a spoke"));
         if is_border(arriving) {
@@ -97,21 +99,22 @@ pub fn fan<M: HalfEdges + ?Sized>(mesh: &M, h: u32, is_border: impl Fn(u32) -> b
     Fan { spokes: before, closed: false }
 }
 
-/// Number of faces in the fan of `h` over twins, and whether it is closed; as [`fan`], without collecting.
-pub fn fan_size<M: HalfEdges + ?Sized>(mesh: &M, h: u32) -> (usize, bool) {
+/// Number of faces in the [`fan`] of `h`, and whether it is closed, without collecting them.
+pub fn fan_size<M: HalfEdges + ?Sized>(mesh: &M, h: u32, is_border: impl Fn(u32) -> bool) -> (usize, bool) {
     let mut n = 1;
-    let mut spoke = mesh.twin(mesh.prev(h));
-    while spoke != NONE {
+    let mut arriving = mesh.prev(h);
+    while !is_border(arriving) {
+        let spoke = mesh.twin(arriving);
         if spoke == h {
             return (n, true);
         }
         n += 1;
-        spoke = mesh.twin(mesh.prev(spoke));
+        arriving = mesh.prev(spoke);
     }
-    let mut across = mesh.twin(h);
-    while across != NONE {
+    let mut spoke = h;
+    while !is_border(spoke) {
         n += 1;
-        across = mesh.twin(mesh.next(across));
+        spoke = mesh.next(mesh.twin(spoke));
     }
     (n, false)
 }

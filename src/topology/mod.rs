@@ -30,4 +30,4 @@ mod half_edges;
 mod pairs;
 
 pub use build::{MeshCounts, Topology};
-pub use half_edges::{Fan, HalfEdges, NONE, VertexTags, fan};
+pub use half_edges::{Fan, HalfEdges, NONE, VertexTags, fan, fan_size};

@@ -94,7 +94,7 @@ impl EditedMesh {
         weighted_sum(&rules::refined_row(rules, &self.mesh, origin), known)
     }
 
-    /// What the columns of rows mean, see [`rules::face_point`].
+    /// What the columns of rows mean, see [`rules::refined_row`].
     fn points_and_face_point(&self) -> Vec<Point> {
         let n = self.mesh.n_corners();
         let share = 1.0 / f64::from(n);
