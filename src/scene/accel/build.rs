@@ -17,7 +17,7 @@
 use super::collapse::{Collapse, Lane, parents_first};
 use super::groups::{Group, groups};
 use super::parts::divide;
-use super::{EMPTY, LANES, LEAF, TopLevel, WideNode};
+use super::{EMPTY, LANES, LEAF, NodeBoxes, Nodes, TopLevel};
 use crate::math::Bounds;
 use crate::parallel::for_each;
 use glam::{Vec3, Vec3A};
@@ -45,7 +45,7 @@ const JITTER_STEPS: f32 = 1.0;
 /// points on a line have an area then.
 const WIDENING_STEPS: f32 = 16.0;
 
-impl WideNode {
+impl NodeBoxes {
     const NOTHING: Self = Self {
         planes: [
             [f32::INFINITY; LANES],
@@ -55,15 +55,37 @@ impl WideNode {
             [f32::NEG_INFINITY; LANES],
             [f32::NEG_INFINITY; LANES],
         ],
-        refs: [EMPTY; LANES],
     };
+}
 
-    fn set(&mut self, lane: usize, bounds: &Bounds, reference: u32) {
+impl Nodes {
+    /// Without nodes; growing to `n` copies nothing.
+    fn with_capacity(n: usize) -> Self {
+        Self { boxes: Vec::with_capacity(n), refs: Vec::with_capacity(n) }
+    }
+
+    /// Adds a node without children; returns its number.
+    fn push(&mut self) -> usize {
+        self.boxes.push(NodeBoxes::NOTHING);
+        self.refs.push([EMPTY; LANES]);
+        self.refs.len() - 1
+    }
+
+    fn set(&mut self, node: usize, lane: usize, bounds: &Bounds, reference: u32) {
         for k in 0..3 {
-            self.planes[k][lane] = bounds.min[k];
-            self.planes[k + 3][lane] = bounds.max[k];
+            self.boxes[node].planes[k][lane] = bounds.min[k];
+            self.boxes[node].planes[k + 3][lane] = bounds.max[k];
         }
-        self.refs[lane] = reference;
+        self.refs[node][lane] = reference;
+    }
+
+    /// Adds the nodes of a tree; returns the number of its root.
+    fn add_tree(&mut self, tree: &Self) -> u32 {
+        let root = self.refs.len() as u32;
+        let in_place = |r: u32| if r & LEAF == 0 { r + root } else { r };
+        self.boxes.extend_from_slice(&tree.boxes);
+        self.refs.extend(tree.refs.iter().map(|refs| refs.map(in_place)));
+        root
     }
 }
 
@@ -72,7 +94,9 @@ impl TopLevel {
     /// them. The same tree for any number of threads.
     pub fn build(patches: &[Bounds], n_threads: usize) -> Self {
         if patches.is_empty() {
-            return Self { nodes: vec![WideNode::NOTHING], stack_need: LANES };
+            let mut nodes = Nodes::default();
+            nodes.push();
+            return Self { nodes, stack_need: LANES };
         }
         let mut members: Vec<u32> = (0..patches.len() as u32).collect();
         let parts = divide(patches, &mut members, n_threads);
@@ -103,7 +127,7 @@ impl TopLevel {
 
 /// Trees of parts being joined, in the order of the parts, in which they do not become ready.
 struct Assembly {
-    nodes: Vec<WideNode>,
+    nodes: Nodes,
     /// Nodes of the tree over parts, which stand first.
     n_above: usize,
     /// The root of each part that is in its place.
@@ -117,10 +141,10 @@ struct Assembly {
 impl Assembly {
     fn under(above: TopLevel, n_patches: usize) -> Self {
         // Growing, or shrinking at the end, would copy and hold everything twice. What is not used is never resident.
-        let mut nodes = Vec::with_capacity(n_patches / PATCHES_PER_NODE);
-        nodes.extend_from_slice(&above.nodes);
+        let mut nodes = Nodes::with_capacity(n_patches / PATCHES_PER_NODE);
+        nodes.add_tree(&above.nodes);
         Self {
-            n_above: above.nodes.len(),
+            n_above: above.nodes.refs.len(),
             stack_above: above.stack_need,
             nodes,
             roots: Vec::new(),
@@ -132,17 +156,14 @@ impl Assembly {
     fn add(&mut self, part: usize, tree: TopLevel) {
         self.waiting.insert(part, tree);
         while let Some(tree) = self.waiting.remove(&self.roots.len()) {
-            let root = self.nodes.len() as u32;
-            let in_place = |r: u32| if r & LEAF == 0 { r + root } else { r };
-            self.nodes.extend(tree.nodes.iter().map(|n| WideNode { refs: n.refs.map(in_place), ..*n }));
-            self.roots.push(root);
+            self.roots.push(self.nodes.add_tree(&tree.nodes));
             self.stack_below = self.stack_below.max(tree.stack_need);
         }
     }
 
     fn finish(mut self) -> TopLevel {
-        let (above, _) = self.nodes.split_at_mut(self.n_above);
-        let leaves = above.iter_mut().flat_map(|n| &mut n.refs).filter(|r| **r != EMPTY && **r & LEAF != 0);
+        let above = &mut self.nodes.refs[..self.n_above];
+        let leaves = above.iter_mut().flatten().filter(|r| **r != EMPTY && **r & LEAF != 0);
         leaves.for_each(|r| *r = self.roots[(*r & !LEAF) as usize]);
         TopLevel { nodes: self.nodes, stack_need: self.stack_above + self.stack_below }
     }
@@ -195,7 +216,8 @@ struct Pending {
 
 /// Writes the wide tree from the root down; children of a node are neighbours.
 fn emit(collapse: &Collapse<'_>, boxes: &[Bounds]) -> TopLevel {
-    let mut nodes = vec![WideNode::NOTHING];
+    let mut nodes = Nodes::default();
+    nodes.push();
     let mut pending = vec![Pending { node: 0, binary: 0, depth: 1 }];
     let mut deepest = 1;
     let mut lanes = Vec::with_capacity(LANES);
@@ -206,14 +228,15 @@ fn emit(collapse: &Collapse<'_>, boxes: &[Bounds]) -> TopLevel {
             let (bounds, reference) = match *child {
                 Lane::Box(number) => (boxes[number as usize], LEAF | number),
                 Lane::Node(binary) => {
-                    nodes.push(WideNode::NOTHING);
-                    pending.push(Pending { node: nodes.len() - 1, binary, depth: depth + 1 });
-                    (collapse.bounds(binary), (nodes.len() - 1) as u32)
+                    let node = nodes.push();
+                    pending.push(Pending { node, binary, depth: depth + 1 });
+                    (collapse.bounds(binary), node as u32)
                 }
             };
-            nodes[node].set(lane, &bounds, reference);
+            nodes.set(node, lane, &bounds, reference);
         }
     }
-    nodes.shrink_to_fit();
+    nodes.boxes.shrink_to_fit();
+    nodes.refs.shrink_to_fit();
     TopLevel { nodes, stack_need: (LANES - 1) * deepest + 1 }
 }

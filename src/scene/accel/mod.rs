@@ -5,7 +5,7 @@
 //! its address is known as soon as the leaf is put on the stack, and can be fetched ahead.
 //!
 //! ```text
-//!   node, 224 bytes                      stack entry, 64 bits, ordered by t
+//!   node, 192 + 32 bytes                 stack entry, 64 bits, ordered by t
 //!   ┌───────────────────────┬─────────┐  ┌──────────────┬─┬──────────────────────┐
 //!   │ x, y, z low, x, y, z  │ 8 refs  │  │ t of entry   │L│ node, or leaf slot   │
 //!   │ high: 6 x 8 floats    │ 32 bits │  └──────────────┴─┴──────────────────────┘
@@ -50,17 +50,28 @@ const LEAF: u32 = 1 << 31;
 /// The ref of an empty lane.
 const EMPTY: u32 = u32::MAX;
 
-/// Up to eight boxes and what is in them.
+/// The boxes of a node: exactly three cache lines, so that no load of a plane takes two.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(32))]
-struct WideNode {
+#[repr(C, align(64))]
+struct NodeBoxes {
     /// Low planes of x, y, z, then high planes. An empty lane has its low planes above its high ones.
     planes: [[f32; LANES]; 6],
-    /// `LEAF | patch`, or an inner node, or `EMPTY`.
-    refs: [u32; LANES],
 }
 
-const _: () = assert!(size_of::<WideNode>() == 224);
+const _: () = assert!(size_of::<NodeBoxes>() == 192);
+
+/// What the lanes of a node are: `LEAF | patch`, or an inner node, or `EMPTY`.
+type Refs = [u32; LANES];
+
+/// Bytes of a node.
+pub const NODE_BYTES: usize = size_of::<NodeBoxes>() + size_of::<Refs>();
+
+/// All nodes, in two lists of the same length.
+#[derive(Clone, Debug, Default)]
+struct Nodes {
+    boxes: Vec<NodeBoxes>,
+    refs: Vec<Refs>,
+}
 
 /// The tree over a mesh's patches.
 ///
@@ -80,7 +91,7 @@ const _: () = assert!(size_of::<WideNode>() == 224);
 /// ```
 #[derive(Clone, Debug)]
 pub struct TopLevel {
-    nodes: Vec<WideNode>,
+    nodes: Nodes,
     /// Entries that a traversal can have on its stack at once.
     stack_need: usize,
 }
@@ -88,17 +99,17 @@ pub struct TopLevel {
 impl TopLevel {
     /// Size of the table that [`LeafRef::slot`] indexes: eight for every node.
     pub fn n_slots(&self) -> usize {
-        LANES * self.nodes.len()
+        LANES * self.nodes.refs.len()
     }
 
     /// Resident size.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.nodes.as_slice())
+        NODE_BYTES * self.nodes.refs.len()
     }
 
     /// All leaves, in the order of their slots.
     pub fn leaves(&self) -> impl Iterator<Item = LeafRef> + '_ {
-        let refs = self.nodes.iter().flat_map(|n| n.refs);
+        let refs = self.nodes.refs.iter().flatten().copied();
         refs.enumerate()
             .filter(|(_, r)| *r != EMPTY && r & LEAF != 0)
             .map(|(slot, r)| LeafRef { slot: slot as u32, patch: PatchId(r & !LEAF) })

@@ -1,6 +1,6 @@
 //! Rays through the wide tree.
 
-use super::{LANES, LEAF, LeafRef, TopLevel, WideNode};
+use super::{LANES, LEAF, LeafRef, NodeBoxes, Refs, TopLevel};
 use crate::grid::{LatticeRay, Plane};
 use crate::ids::PatchId;
 use crate::math::simd::Kernel;
@@ -72,16 +72,24 @@ impl TopLevel {
         if target & LEAF != 0 {
             return leaf(target & !LEAF);
         }
-        let lines: *const [u8; 64] = self.nodes.as_ptr().wrapping_add(target as usize).cast();
-        for line in 0..4 {
+        let lines: *const [u8; 64] = self.nodes.boxes.as_ptr().wrapping_add(target as usize).cast();
+        for line in 0..size_of::<NodeBoxes>() / 64 {
             k.prefetch(lines.wrapping_add(line));
         }
+        k.prefetch(self.nodes.refs.as_ptr().wrapping_add(target as usize));
+    }
+
+    /// What a lane of a node leads to.
+    #[inline(always)]
+    fn target(&self, node: u32, refs: &Refs, lane: usize) -> u32 {
+        let reference = refs[lane % LANES];
+        if reference & LEAF != 0 { LEAF | node * LANES as u32 + lane as u32 } else { reference }
     }
 
     #[inline(always)]
     fn leaf(&self, target: u32) -> LeafRef {
         let slot = target & !LEAF;
-        let reference = self.nodes[slot as usize / LANES].refs[slot as usize % LANES];
+        let reference = self.nodes.refs[slot as usize / LANES][slot as usize % LANES];
         LeafRef { slot, patch: PatchId(reference & !LEAF) }
     }
 }
@@ -135,12 +143,12 @@ impl Walk<'_> {
         prefetch: &impl Fn(u32),
     ) -> Option<u32> {
         let tree = self.tree;
-        let wide = &tree.nodes[node as usize];
-        let (mask, t_near) = wide.test(k, ray, t_max);
+        let (boxes, refs) = (&tree.nodes.boxes[node as usize], &tree.nodes.refs[node as usize]);
+        let (mask, t_near) = boxes.test(k, ray, t_max);
         if mask == 0 {
             return None;
         }
-        let target = |lane: usize| wide.target(node, lane);
+        let target = |lane: usize| tree.target(node, refs, lane);
         let (lane, rest) = (mask.trailing_zeros() as usize % LANES, mask & (mask - 1));
         if rest == 0 {
             return Some(announced_leaf(target(lane), prefetch));
@@ -182,14 +190,15 @@ impl Walk<'_> {
             if node & LEAF != 0 {
                 return Some(self.tree.leaf(node));
             }
-            let wide = &self.tree.nodes[node as usize];
-            let (mut mask, _) = wide.test(kernel, ray, ray.t_max);
+            let tree = self.tree;
+            let (boxes, refs) = (&tree.nodes.boxes[node as usize], &tree.nodes.refs[node as usize]);
+            let (mut mask, _) = boxes.test(kernel, ray, ray.t_max);
             let room: &mut [Entry; LANES] = self.stack[self.n..].first_chunk_mut().expect("room for a node's lanes");
             let mut n = 0;
             while mask != 0 {
-                let target = wide.target(node, mask.trailing_zeros() as usize % LANES);
+                let target = tree.target(node, refs, mask.trailing_zeros() as usize % LANES);
                 mask &= mask - 1;
-                self.tree.prefetch(kernel, target, &prefetch);
+                tree.prefetch(kernel, target, &prefetch);
                 room[n % LANES] = entry(0.0, target);
                 n += 1;
             }
@@ -199,14 +208,7 @@ impl Walk<'_> {
     }
 }
 
-impl WideNode {
-    /// What a lane of this node, number `node`, leads to.
-    #[inline(always)]
-    fn target(&self, node: u32, lane: usize) -> u32 {
-        let reference = self.refs[lane % LANES];
-        if reference & LEAF != 0 { LEAF | node * LANES as u32 + lane as u32 } else { reference }
-    }
-
+impl NodeBoxes {
     /// The lanes that the ray meets between 0 and `t_max`, and where it enters them.
     #[inline(always)]
     fn test<K: Kernel>(&self, k: K, ray: &LatticeRay, t_max: f32) -> (u32, K::F) {

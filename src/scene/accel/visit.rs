@@ -1,11 +1,11 @@
 //! A walk through the tree that is led by boxes instead of a ray.
 
-use super::{EMPTY, LANES, LEAF, TopLevel, WideNode};
+use super::{EMPTY, LANES, LEAF, NodeBoxes, TopLevel};
 use crate::ids::PatchId;
 use crate::math::Bounds;
 use glam::Vec3;
 
-impl WideNode {
+impl NodeBoxes {
     fn bounds(&self, lane: usize) -> Bounds {
         let corner = |first: usize| {
             Vec3::new(self.planes[first][lane], self.planes[first + 1][lane], self.planes[first + 2][lane])
@@ -20,12 +20,12 @@ impl TopLevel {
     pub fn visit(&self, mut enter: impl FnMut(&Bounds) -> bool, mut leaf: impl FnMut(PatchId, &Bounds)) {
         let mut pending = vec![0u32];
         while let Some(node) = pending.pop() {
-            let node = &self.nodes[node as usize];
+            let (boxes, refs) = (&self.nodes.boxes[node as usize], &self.nodes.refs[node as usize]);
             for lane in 0..LANES {
-                match node.refs[lane] {
+                match refs[lane] {
                     EMPTY => {}
-                    reference if reference & LEAF != 0 => leaf(PatchId(reference & !LEAF), &node.bounds(lane)),
-                    reference if enter(&node.bounds(lane)) => pending.push(reference),
+                    reference if reference & LEAF != 0 => leaf(PatchId(reference & !LEAF), &boxes.bounds(lane)),
+                    reference if enter(&boxes.bounds(lane)) => pending.push(reference),
                     _ => {}
                 }
             }
