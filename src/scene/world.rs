@@ -292,7 +292,7 @@ impl WorldMesh {
     pub fn build_bytes(mesh: &ControlMesh) -> BuildBytes {
         let (corners, vertices) = (mesh.face_vertices.len(), mesh.positions.len());
         let patches: usize = mesh.face_sizes.iter().map(|&n| if n == 4 { 1 } else { n as usize }).sum();
-        let mixed = if patches == mesh.n_faces() { 0 } else { 8 * mesh.n_faces() + corners / 4 };
+        let mixed = if patches == mesh.n_faces() { 0 } else { 8 * mesh.n_faces() + (corners + patches) / 4 };
         let tex_coords = mesh.tex_coords.as_ref().map_or(0, TexCoords::bytes);
         let surface = 8 * corners + 12 * vertices + vertices / 8 + 4 * mesh.n_faces() + mixed + tex_coords;
         let tree = TREE_BYTES_PER_PATCH * patches;

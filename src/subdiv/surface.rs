@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::ids::{FaceId, PatchId};
 use crate::math::DBounds;
 use crate::mesh::ControlMesh;
-use crate::topology::{HalfEdges, NONE, Topology};
+use crate::topology::{FaceIndex, HalfEdges, NONE, Topology};
 use glam::DVec3;
 use parking_lot::RwLock;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -71,8 +71,8 @@ pub struct Surface {
     control: Vec<[f32; 3]>,
     plans: PlanLibrary,
     plan_of_face: Vec<NodeId>,
-    /// First patch of each face, then the total; `None` if every face is one patch.
-    first_patch: Option<Vec<u32>>,
+    /// The patches of each face; `None` if every face is one patch.
+    faces_of_patches: Option<FaceIndex>,
     edited: EditedPatches,
 }
 
@@ -114,14 +114,17 @@ impl Surface {
         let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
         let sites = EditSites::new(&mesh.edits, &topology);
         let (plans, plan_of_face) = plan_faces(&topology, rules, n_threads, &sites);
-        let first_patch = (!topology.all_quads()).then(|| first_patches(&mesh.face_sizes));
-        if first_patch.as_ref().is_some_and(|f| f.last().is_some_and(|&n| n > u32::MAX / 2)) {
+        let n_patches = |n: u32| if n == 4 { 1 } else { n };
+        let total: u64 = mesh.face_sizes.iter().map(|&n| u64::from(n_patches(n))).sum();
+        if total > u64::from(u32::MAX / 2) {
             return Err(Error::input("the mesh has more than 2^31 patches: split it"));
         }
+        let patches = || FaceIndex::mixed(mesh.face_sizes.iter().map(|&n| n_patches(n)));
+        let faces_of_patches = (!topology.all_quads()).then(patches);
         let lattice = Lattice { center: DVec3::ZERO, step: 1.0 };
         let (control, edited) = (Vec::new(), EditedPatches::default());
         let id = SURFACES.fetch_add(1, Ordering::Relaxed);
-        let mut surface = Self { id, topology, lattice, control, plans, plan_of_face, first_patch, edited };
+        let mut surface = Self { id, topology, lattice, control, plans, plan_of_face, faces_of_patches, edited };
         surface.place(mesh, &sites)?;
         surface.plans.seal();
         Ok(surface)
@@ -150,8 +153,8 @@ impl Surface {
         sites: &EditSites,
         control_point: &dyn Fn(u32) -> Point,
     ) -> Result<EditedPatches> {
-        let first_patch = self.first_patch.as_deref();
-        let patch_of = |face, sub| patch_of(first_patch, face, sub);
+        let faces_of_patches = self.faces_of_patches.as_ref();
+        let patch_of = |face, sub| patch_of(faces_of_patches, face, sub);
         EditedPatches::new(mesh, &self.topology, sites, &mut self.plans, self.lattice, control_point, patch_of)
     }
 
@@ -172,23 +175,24 @@ impl Surface {
 
     /// Number of patch ids, those of hidden faces included.
     pub fn n_patches(&self) -> usize {
-        self.first_patch.as_ref().map_or(self.topology.n_faces(), |first| first[first.len() - 1] as usize)
+        self.faces_of_patches.as_ref().map_or(self.topology.n_faces(), FaceIndex::n_things)
     }
 
     /// The face of a patch and which of its sub-quads it is.
+    #[inline]
     pub fn face_of(&self, patch: PatchId) -> (FaceId, u32) {
-        match &self.first_patch {
+        match &self.faces_of_patches {
             None => (FaceId(patch.0), 0),
-            Some(first) => {
-                let face = face_from(first, patch.0);
-                (FaceId(face as u32), patch.0 - first[face])
+            Some(index) => {
+                let face = index.face(patch.0);
+                (FaceId(face), patch.0 - index.corners(face).0)
             }
         }
     }
 
     /// The patch of a face's sub-quad.
     pub fn patch_of(&self, face: FaceId, sub: u32) -> PatchId {
-        patch_of(self.first_patch.as_deref(), face, sub)
+        patch_of(self.faces_of_patches.as_ref(), face, sub)
     }
 
     /// Whether the patch has a surface, or parts of one.
@@ -233,7 +237,7 @@ impl Surface {
             + self.control_bytes()
             + self.plans.bytes()
             + 4 * self.plan_of_face.len()
-            + self.first_patch.as_ref().map_or(0, |f| 4 * f.len())
+            + self.faces_of_patches.as_ref().map_or(0, FaceIndex::bytes)
             + self.edited.bytes()
     }
 
@@ -349,36 +353,8 @@ fn lattice_point(control: &[[f32; 3]], vertex: u32) -> Point {
     Point::new(f64::from(x), f64::from(y), f64::from(z))
 }
 
-fn patch_of(first_patch: Option<&[u32]>, face: FaceId, sub: u32) -> PatchId {
-    PatchId(first_patch.map_or(face.0, |first| first[face.idx()]) + sub)
-}
-
-/// The face of a patch. Most meshes are quads with some other faces strewn in, so that a guess in proportion is close:
-/// from there by growing steps until the patch lies between two of them, then by halves.
-fn face_from(first: &[u32], patch: u32) -> usize {
-    let n_faces = first.len() - 1;
-    let guess = (u64::from(patch) * n_faces as u64 / u64::from(first[n_faces])) as usize;
-    let (mut low, mut high, mut step) = (guess, guess + 1, 1);
-    while first[low] > patch {
-        (low, high) = (low.saturating_sub(step), low);
-        step *= 2;
-    }
-    while first[high] <= patch {
-        (low, high) = (high, (high + step).min(n_faces));
-        step *= 2;
-    }
-    low + first[low..high].partition_point(|&p| p <= patch) - 1
-}
-
-fn first_patches(sizes: &[u32]) -> Vec<u32> {
-    let mut total = 0u32;
-    let mut first: Vec<u32> = Vec::with_capacity(sizes.len() + 1);
-    for &n in sizes {
-        first.push(total);
-        total = total.saturating_add(if n == 4 { 1 } else { n });
-    }
-    first.push(total);
-    first
+fn patch_of(faces_of_patches: Option<&FaceIndex>, face: FaceId, sub: u32) -> PatchId {
+    PatchId(faces_of_patches.map_or(face.0, |index| index.corners(face.0).0) + sub)
 }
 
 /// The 16 vertices around an untagged quad with regular corners, u fastest, by plain hops; `None` for other faces.

@@ -1,6 +1,7 @@
-//! From a half-edge to its face and back, in a quarter of a byte a half-edge for mixed polygons and none for quads.
+//! From what faces are numbered by in turn, half-edges or patches, to the face and back: in a quarter of a byte each for mixed
+//! polygons, and none for quads.
 
-/// Where each face's half-edges start.
+/// Where each face's half-edges start, or its patches.
 #[derive(Debug)]
 pub enum FaceIndex {
     /// Every face has four corners.
@@ -25,17 +26,22 @@ impl FaceIndex {
         if sizes.iter().all(|&n| n == 4) {
             return FaceIndex::Quads { n_faces: sizes.len() as u32 };
         }
+        Self::mixed(sizes.iter().copied())
+    }
+
+    /// An index for faces that have as many things each, at least one, and fewer than 2^32 together.
+    pub fn mixed(sizes: impl ExactSizeIterator<Item = u32>) -> Self {
         let mut start = Vec::with_capacity(sizes.len() + 1);
         let mut total = 0;
-        for &n in sizes {
+        for n in sizes {
             start.push(total);
             total += n;
         }
-        start.push(total);
         let mut is_start = vec![0u64; total as usize / 64 + 1];
-        for &s in &start[..sizes.len()] {
+        for &s in &start {
             is_start[s as usize / 64] |= 1 << (s % 64);
         }
+        start.push(total);
         let mut before = 0;
         let rank = is_start
             .iter()
@@ -55,7 +61,15 @@ impl FaceIndex {
         }
     }
 
-    /// The face that half-edge `h` belongs to.
+    /// Number of half-edges or patches.
+    pub fn n_things(&self) -> usize {
+        match self {
+            FaceIndex::Quads { n_faces } => 4 * *n_faces as usize,
+            FaceIndex::Mixed { start, .. } => start[start.len() - 1] as usize,
+        }
+    }
+
+    /// The face that half-edge (or patch) `h` belongs to.
     #[inline]
     pub fn face(&self, h: u32) -> u32 {
         match self {
@@ -67,7 +81,7 @@ impl FaceIndex {
         }
     }
 
-    /// First half-edge and number of corners of a face.
+    /// First half-edge (or patch) and number of them of a face.
     #[inline]
     pub fn corners(&self, face: u32) -> (u32, u32) {
         match self {

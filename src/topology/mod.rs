@@ -30,4 +30,5 @@ mod half_edges;
 mod pairs;
 
 pub use build::{MeshCounts, Topology};
+pub use face_index::FaceIndex;
 pub use half_edges::{Fan, HalfEdges, NONE, VertexTags, fan, fan_size};
