@@ -62,8 +62,8 @@ impl Evaluator {
         bounds: &mut DBounds,
     ) {
         match library.plan(node) {
-            Plan::Regular(rows) => {
-                let control = control_points(library.rows(), rows, &self.points[ring..]);
+            Plan::Regular(rows, turn) => {
+                let control = control_points(library.rows(), rows, turn, &self.points[ring..]);
                 self.grow_by_hull(bounds, &control, u, v);
             }
             Plan::Split { in_hull: true, .. } if depth == 0 => {
@@ -76,9 +76,10 @@ impl Evaluator {
                 let is_alone = is_in_one_half(u) && is_in_one_half(v);
                 let refined = if is_alone { None } else { Some(self.refine(library, rows, ring)) };
                 let mark = self.points.len();
-                for (k, child) in children.iter().enumerate() {
+                for k in 0..4 {
                     let (x, y) = quarter(k);
                     let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) else { continue };
+                    let child = &children.get(k);
                     let child_ring = match refined {
                         Some(refined) => self.push_child(library, child, refined),
                         None => self.refine_child(library, rows, child, ring),

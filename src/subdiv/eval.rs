@@ -1,7 +1,7 @@
 //! Walking down plans: grids of points, and single samples with tangents.
 
 use super::bounds::HullWeights;
-use super::plan::{Child, Limit, NodeId, Plan, PlanLibrary};
+use super::plan::{Child, Children, Limit, Limits, NodeId, Plan, PlanLibrary};
 use super::products::{child_points, control_points, one_product, products};
 use super::regular::{self, ControlPoints};
 use super::rows::SparseRows;
@@ -194,8 +194,8 @@ impl Evaluator {
         out: &mut [Point],
     ) {
         let (rows, children, limits) = match library.plan(node) {
-            Plan::Regular(rows) => {
-                let control = control_points(library.rows(), rows, &self.points[ring..]);
+            Plan::Regular(rows, turn) => {
+                let control = control_points(library.rows(), rows, turn, &self.points[ring..]);
                 return self.regular(&control, target, out);
             }
             Plan::Split { rows, children, limits, .. } => (rows, children, limits),
@@ -215,7 +215,8 @@ impl Evaluator {
         let start = self.points.len();
         let refined = if quarters.count_ones() > 1 { Some(self.refine(library, rows, ring)) } else { None };
         let marks = (self.points.len(), self.params.len());
-        for (k, child) in children.iter().enumerate().filter(|(k, _)| quarters >> k & 1 == 1) {
+        for k in (0..4).filter(|k| quarters >> k & 1 == 1) {
+            let child = &children.get(k);
             let part = self.quarter_target(&target, middle, k);
             let child_ring = match refined {
                 Some(refined) => self.push_child(library, child, refined),
@@ -231,9 +232,10 @@ impl Evaluator {
 
     /// Corners whose limit is known here, in place of what deeper parts made of them: a point alone comes no further than
     /// this, and must not depend on its company.
-    fn set_corners(&self, library: &PlanLibrary, limits: &[Limit], ring: usize, target: &Target, out: &mut [Point]) {
+    fn set_corners(&self, library: &PlanLibrary, limits: Limits<'_>, ring: usize, target: &Target, out: &mut [Point]) {
         let (n_u, n_v) = (target.us.1 - target.us.0, target.vs.1 - target.vs.0);
-        for (k, limit) in limits.iter().enumerate() {
+        for k in 0..4 {
+            let Some(limit) = limits.get(k) else { continue };
             let (x, y) = quarter(k);
             let (i, j) = (if x == 0.0 { 0 } else { n_u - 1 }, if y == 0.0 { 0 } else { n_v - 1 });
             let is_wanted = self.params[target.us.0 + i] == x && self.params[target.vs.0 + j] == y;
@@ -353,24 +355,27 @@ impl Evaluator {
         };
         for depth in depth.. {
             match library.plan(node) {
-                Plan::Regular(rows) => {
-                    let control = control_points(library.rows(), rows, &self.points[ring..]);
+                Plan::Regular(rows, turn) => {
+                    let control = control_points(library.rows(), rows, turn, &self.points[ring..]);
                     return found_at(regular_sample(&control, u, v, scale), position);
                 }
                 Plan::Split { rows, children, limits, .. } => {
                     let corner =
                         if depth < MAX_DEPTH { exact_corner(u, v) } else { exact_corner(u.round(), v.round()) };
                     let limit = corner.and_then(|k| limits.get(k));
-                    if let Some(sample) = limit.and_then(|limit| limit_sample(library, limit, &self.points[ring..])) {
+                    if let Some(sample) =
+                        limit.and_then(|limit| limit_sample(library, limit, limits.turn, &self.points[ring..]))
+                    {
                         return found_at(sample, position);
                     }
                     if let (None, Some(Limit::Below(row))) = (position, limit) {
-                        position = Some(one_product(library.rows(), *row, 0, &self.points[ring..]).to_vec());
+                        position = Some(one_product(library.rows(), row, 0, &self.points[ring..]).to_vec());
                     }
                     let (x, y) = (f64::from(u8::from(u >= 0.5)), f64::from(u8::from(v >= 0.5)));
                     let k = exact_corner(x, y).expect("halves are corners");
-                    ring = self.refine_child(library, rows, &children[k], ring);
-                    node = children[k].node;
+                    let child = children.get(k);
+                    ring = self.refine_child(library, rows, &child, ring);
+                    node = child.node;
                     (u, v) = (2.0 * u - x, 2.0 * v - y);
                     scale *= 2.0;
                 }
@@ -391,7 +396,7 @@ impl Evaluator {
 
     /// The ring points of a child of a polygon, in place of what was in `out`; `points` are those of [`Self::refine_polygon`].
     pub fn child_ring(library: &PlanLibrary, node: NodeId, points: &[Point], k: usize, out: &mut Vec<Point>) -> NodeId {
-        let child = &polygon(library, node).1[k];
+        let child = polygon(library, node).1.get(k);
         let refined = &points[library.n_points(node)..];
         out.clear();
         out.resize(child.points.len(), Point::ZERO);
@@ -400,10 +405,10 @@ impl Evaluator {
     }
 }
 
-fn polygon(library: &PlanLibrary, node: NodeId) -> (SparseRows, &[Child]) {
+fn polygon(library: &PlanLibrary, node: NodeId) -> (SparseRows, Children<'_>) {
     match library.plan(node) {
         Plan::Split { rows, children, .. } => (rows, children),
-        Plan::Regular(_) => unreachable!("a polygon is never regular"),
+        Plan::Regular(..) => unreachable!("a polygon is never regular"),
     }
 }
 
@@ -432,9 +437,9 @@ pub fn sample_regular(control: &ControlPoints, u: f64, v: f64) -> SurfaceSample 
     regular_sample(control, u, v, 1.0)
 }
 
-fn limit_sample(library: &PlanLibrary, limit: &Limit, points: &[Point]) -> Option<SurfaceSample> {
+fn limit_sample(library: &PlanLibrary, limit: Limit, turn: u32, points: &[Point]) -> Option<SurfaceSample> {
     let at = |rows: SparseRows, i| one_product(library.rows(), rows, i, points).to_vec();
-    match *limit {
+    match limit {
         Limit::Regular | Limit::Below(_) => None,
         Limit::Position(rows) => Some(SurfaceSample {
             position: at(rows, 0),
@@ -442,11 +447,11 @@ fn limit_sample(library: &PlanLibrary, limit: &Limit, points: &[Point]) -> Optio
             dv: DVec3::ZERO,
             kind: SampleKind::PositionOnly,
         }),
-        Limit::Smooth(rows) => Some(SurfaceSample {
-            position: at(rows, 0),
-            du: at(rows, 1).normalize_or_zero(),
-            dv: at(rows, 2).normalize_or_zero(),
-            kind: SampleKind::Extraordinary,
-        }),
+        Limit::Smooth(rows) => {
+            let along = [at(rows, 1).normalize_or_zero(), at(rows, 2).normalize_or_zero()];
+            // A turn takes u to where v was.
+            let [du, dv] = (0..turn).fold(along, |[du, dv], _| [-dv, du]);
+            Some(SurfaceSample { position: at(rows, 0), du, dv, kind: SampleKind::Extraordinary })
+        }
     }
 }

@@ -247,6 +247,49 @@ impl Numbering {
     }
 }
 
+/// What tells a corner of the target from others: equal for equal corners, and different for most others.
+#[derive(Default)]
+struct CornerSign {
+    hash: u64,
+    /// Faces beside the target.
+    n_faces: u32,
+    has_polygon: bool,
+}
+
+impl CornerSign {
+    #[inline(always)]
+    fn add(&mut self, word: u32) {
+        self.hash = (self.hash.rotate_left(5) ^ u64::from(word)).wrapping_mul(0x517c_c1b7_2722_0a95);
+    }
+
+    /// A face in the order of the fan: its number of corners, or the complement if it lies clockwise.
+    #[inline(always)]
+    fn add_face(&mut self, size: u32) {
+        self.n_faces += 1;
+        self.has_polygon |= size != 4 && size != u32::MAX - 4;
+        self.add(size);
+    }
+
+    fn add_tags<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32, tags: &VertexTags) {
+        self.add(tags.sharpness.to_bits());
+        self.add(tags.n_infinite);
+        tags.semi_sharp.iter().for_each(|s| self.add(s.to_bits()));
+        // Which of the edges are sharp: those of the target will do as a rule.
+        self.add(mesh.edge_sharpness(h).to_bits());
+        self.add(mesh.edge_sharpness(mesh.prev(h)).to_bits());
+    }
+
+    fn is_irregular(&self, is_closed: bool) -> bool {
+        self.has_polygon || if is_closed { self.n_faces != 3 } else { self.n_faces > 1 }
+    }
+}
+
+/// The turn of four corners that comes first in the order of their signs.
+fn least_turn(signs: &[u64]) -> u32 {
+    let turned = |t: usize| [0, 1, 2, 3].map(|k| signs[(t + k) % 4]);
+    (1..4).fold(0, |best, t| if turned(t) < turned(best) { t } else { best }) as u32
+}
+
 /// Finds rings, one after the other, in memory that it keeps.
 #[derive(Debug, Default)]
 pub struct RingWalker {
@@ -255,8 +298,11 @@ pub struct RingWalker {
     vertices: Numbering,
     /// Half-edges of the source, in the ring's order.
     half_edges: Vec<u32>,
-    /// Tags of the target's corners.
+    /// Tags of the target's corners, and what tells the corners apart.
     corner_tags: Vec<VertexTags>,
+    corner_signs: Vec<u64>,
+    /// Whether something at a corner is known not to be regular.
+    is_irregular: bool,
     ring: Extracted,
 }
 
@@ -264,13 +310,36 @@ impl RingWalker {
     /// The sources that [`extract`] gives for the face of `first`, without the ring: what loading a patch needs, again and
     /// again.
     pub fn sources<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32) -> &[u32] {
-        self.walk(mesh, first);
+        let n_corners = self.walk::<M, false>(mesh, first);
+        self.add_vertices(mesh, n_corners);
         &self.vertices.values
     }
 
     /// As [`extract`].
     pub fn extract<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32, outer_tags: bool) -> &Extracted {
-        self.walk(mesh, first);
+        let n_corners = self.walk::<M, false>(mesh, first);
+        self.finish(mesh, n_corners, outer_tags)
+    }
+
+    /// As [`extract`], but from one of the face's corners that is the same however the face is turned: the one that is that
+    /// many corners after `first`. Rings that may be regular, and those of polygons, are not turned.
+    pub fn extract_turned<M: HalfEdges + ?Sized>(
+        &mut self,
+        mesh: &M,
+        first: u32,
+        outer_tags: bool,
+    ) -> (u32, &Extracted) {
+        let n_corners = self.walk::<M, true>(mesh, first);
+        let turn = if self.is_irregular && n_corners == 4 { least_turn(&self.corner_signs) } else { 0 };
+        if turn != 0 {
+            let (start, _) = mesh.face_corners(mesh.face(first));
+            self.walk::<M, false>(mesh, start + (first - start + turn) % 4);
+        }
+        (turn, self.finish(mesh, n_corners, outer_tags))
+    }
+
+    fn finish<M: HalfEdges + ?Sized>(&mut self, mesh: &M, n_corners: u32, outer_tags: bool) -> &Extracted {
+        self.add_vertices(mesh, n_corners);
         let corner_tags = std::mem::take(&mut self.corner_tags);
         self.write(mesh, &corner_tags, outer_tags);
         self.corner_tags = corner_tags;
@@ -282,22 +351,26 @@ impl RingWalker {
         std::mem::take(&mut self.ring)
     }
 
-    /// Faces, vertices and the tags of corners.
-    fn walk<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32) {
+    /// Finds the faces and the tags of corners, and what tells corners apart if they are to be `SIGNED`. Returns the number
+    /// of corners.
+    fn walk<M: HalfEdges + ?Sized, const SIGNED: bool>(&mut self, mesh: &M, first: u32) -> u32 {
         self.clear();
         self.add_face(mesh, first);
         let (start, n_corners) = mesh.face_corners(mesh.face(first));
         for k in 0..n_corners {
             let turned = first + k;
-            self.add_corner(mesh, if turned < start + n_corners { turned } else { turned - n_corners });
+            let h = if turned < start + n_corners { turned } else { turned - n_corners };
+            self.add_corner::<M, SIGNED>(mesh, h);
         }
-        self.add_vertices(mesh, n_corners);
+        n_corners
     }
 
     fn clear(&mut self) {
         self.faces.clear();
         self.vertices.clear();
         self.corner_tags.clear();
+        self.corner_signs.clear();
+        self.is_irregular = false;
         let ring = &mut self.ring;
         ring.starts.clear();
         self.half_edges.clear();
@@ -316,19 +389,35 @@ impl RingWalker {
 
     /// Adds the faces around a corner of the target, counter-clockwise, then what lies clockwise of it: an order that only
     /// topology decides.
-    fn add_corner<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32) {
+    fn add_corner<M: HalfEdges + ?Sized, const SIGNED: bool>(&mut self, mesh: &M, h: u32) {
+        let mut sign = CornerSign::default();
         if mesh.is_plain(h) {
-            let is_closed = self.add_fan(mesh, h, false);
+            let is_closed = self.add_fan::<M, SIGNED>(mesh, h, false, &mut sign);
             self.corner_tags.push(VertexTags { n_infinite: if is_closed { 0 } else { 2 }, ..Default::default() });
+            self.is_irregular |= sign.is_irregular(is_closed);
         } else {
             let tags = mesh.vertex_tags(h);
-            self.add_fan(mesh, h, tags.n_infinite >= 2);
+            let is_closed = self.add_fan::<M, SIGNED>(mesh, h, tags.n_infinite >= 2, &mut sign);
+            let is_plain = tags == VertexTags { n_infinite: if is_closed { 0 } else { 2 }, ..Default::default() };
+            if SIGNED && !is_plain {
+                sign.add_tags(mesh, h, &tags);
+            }
+            let is_semi_sharp = !tags.semi_sharp.is_empty() || (tags.sharpness > 0.0 && tags.sharpness.is_finite());
+            self.is_irregular |= sign.is_irregular(is_closed) || is_semi_sharp;
             self.corner_tags.push(tags);
         }
+        self.corner_signs.push(sign.hash);
     }
 
     /// Returns whether the faces close around the corner.
-    fn add_fan<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32, cut: bool) -> bool {
+    #[inline(always)]
+    fn add_fan<M: HalfEdges + ?Sized, const SIGNED: bool>(
+        &mut self,
+        mesh: &M,
+        h: u32,
+        cut: bool,
+        sign: &mut CornerSign,
+    ) -> bool {
         let mut spoke = h;
         loop {
             let arriving = mesh.prev(spoke);
@@ -340,11 +429,17 @@ impl RingWalker {
                 return true;
             }
             self.add_face(mesh, spoke);
+            if SIGNED {
+                sign.add_face(mesh.face_corners(mesh.face(spoke)).1);
+            }
         }
         spoke = h;
         while !is_border(mesh, spoke, cut) {
             spoke = mesh.next(mesh.twin(spoke));
             self.add_face(mesh, spoke);
+            if SIGNED {
+                sign.add_face(u32::MAX - mesh.face_corners(mesh.face(spoke)).1);
+            }
         }
         false
     }
@@ -443,6 +538,9 @@ mod tests {
             let topology = Topology::new(&mesh, 1);
             for face in 0..topology.n_faces() as u32 {
                 let first = topology.face_corners(face).0;
+                let (turn, turned) = walker.extract_turned(&topology, first, false);
+                let turned = turned.sources.clone();
+                assert_eq!(extract(&topology, first + turn, false).sources, turned);
                 for outer_tags in [false, true] {
                     let extracted = extract(&topology, first, outer_tags).sources;
                     assert_eq!(walker.sources(&topology, first), extracted);

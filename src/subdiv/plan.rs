@@ -7,9 +7,34 @@ use crate::mesh::CreaseMethod;
 use crate::topology::NONE;
 use rustc_hash::FxHashMap;
 
-/// A node of the library.
+/// A node of the library and a turn: its number in the upper bits, and in the lower two at which corner of the face the
+/// node's corner 0 lies. So the four turns of a ring share a node. Polygons are not turned.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct NodeId(pub u32);
+
+impl NodeId {
+    /// The node itself.
+    fn unturned(index: usize) -> Self {
+        NodeId((index as u32) << 2)
+    }
+
+    #[inline(always)]
+    fn index(self) -> usize {
+        (self.0 >> 2) as usize
+    }
+
+    /// The corner of the face where the node's corner 0 lies.
+    #[inline(always)]
+    pub fn turn(self) -> u32 {
+        self.0 & 3
+    }
+
+    /// The node for a face that is turned once more.
+    #[inline(always)]
+    pub fn turned(self, by: u32) -> Self {
+        NodeId(self.0 & !3 | (self.0 + by) & 3)
+    }
+}
 
 /// A quarter of a split face.
 #[derive(Clone, Copy, Debug)]
@@ -47,20 +72,61 @@ impl Limit {
 /// How the surface over a ring is found.
 #[derive(Clone, Copy, Debug)]
 pub enum Plan<'a> {
-    /// Bicubic B-spline: 16 rows give the control points, u fastest.
-    Regular(SparseRows),
+    /// Bicubic B-spline: 16 rows give the control points, u fastest, of the face from the corner that is the turn.
+    Regular(SparseRows, u32),
     /// One Catmull-Clark step, then the quarters (a polygon of n sides has n children).
     Split {
         /// The refined points that children use. A polygon's first row is its face point, and the others count that as
         /// one more ring point.
         rows: SparseRows,
         /// One child per corner. Quarters of quads keep the quad's orientation; children of polygons start at their corner.
-        children: &'a [Child],
+        children: Children<'a>,
         /// Limits at the corners; none for polygons, of which only the children are evaluated.
-        limits: &'a [Limit],
+        limits: Limits<'a>,
         /// Whether the surface lies in the convex hull of the ring (all weights from here on are non-negative).
         in_hull: bool,
     },
+}
+
+/// The children of a node, as a face has them.
+#[derive(Clone, Copy, Debug)]
+pub struct Children<'a> {
+    all: &'a [Child],
+    turn: u32,
+}
+
+impl Children<'_> {
+    /// The child at corner `k` of the face.
+    #[inline(always)]
+    pub fn get(&self, k: usize) -> Child {
+        if self.turn == 0 {
+            return self.all[k];
+        }
+        let Child { node, points } = self.all[unturned(k, self.turn)];
+        Child { node: node.turned(self.turn), points }
+    }
+}
+
+/// The limits at a node's corners, as a face has them.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits<'a> {
+    all: &'a [Limit],
+    /// See [`NodeId::turn`]; u and v of tangents are those of the node.
+    pub turn: u32,
+}
+
+impl Limits<'_> {
+    /// The limit at corner `k` of the face; none at a polygon's.
+    #[inline(always)]
+    pub fn get(&self, k: usize) -> Option<Limit> {
+        self.all.get(unturned(k, self.turn)).copied()
+    }
+}
+
+/// Which corner of a node lies at corner `k` of a face that is turned.
+#[inline(always)]
+fn unturned(k: usize, turn: u32) -> usize {
+    if turn == 0 { k } else { (k + 4 - turn as usize) % 4 }
 }
 
 /// A node as it is kept.
@@ -68,7 +134,7 @@ pub enum Plan<'a> {
 struct Node {
     n_points: u32,
     rows: SparseRows,
-    /// Where its children start, and how many there are; none for regular nodes.
+    /// Where its children start, and how many there are: 0 for regular nodes, [`NONE`] as long as it is being made.
     children: u32,
     n_children: u32,
     /// Where its limits start, four if there are four children.
@@ -117,19 +183,21 @@ impl PlanLibrary {
 
     /// Number of ring points of a node.
     pub fn n_points(&self, node: NodeId) -> usize {
-        self.nodes[node.0 as usize].n_points as usize
+        self.nodes[node.index()].n_points as usize
     }
 
     /// A node's plan.
     #[inline]
     pub fn plan(&self, node: NodeId) -> Plan<'_> {
-        let node = &self.nodes[node.0 as usize];
+        let turn = node.turn();
+        let node = &self.nodes[node.index()];
         if node.n_children == 0 {
-            return Plan::Regular(node.rows);
+            return Plan::Regular(node.rows, turn);
         }
         let children = &self.children[node.children as usize..][..node.n_children as usize];
         let n_limits = if children.len() == 4 { 4 } else { 0 };
         let limits = &self.limits[node.limits as usize..][..n_limits];
+        let (children, limits) = (Children { all: children, turn }, Limits { all: limits, turn });
         Plan::Split { rows: node.rows, children, limits, in_hull: node.in_hull }
     }
 
@@ -183,14 +251,17 @@ impl PlanLibrary {
 
     /// The node for a ring that is new.
     fn make_node(&mut self, ring: &LocalMesh, key: &[u32]) -> NodeId {
-        let id = NodeId(self.nodes.len() as u32);
+        let id = NodeId::unturned(self.nodes.len());
         let nothing = self.rows.push([]);
         let n_points = ring.n_vertices() as u32;
-        self.nodes.push(Node { n_points, rows: nothing, children: 0, n_children: 0, limits: 0, in_hull: true });
+        self.nodes.push(Node { n_points, rows: nothing, children: 0, n_children: NONE, limits: 0, in_hull: true });
         self.by_key.insert(key.to_vec(), id);
         let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
         match regular {
-            Some(rows) => self.nodes[id.0 as usize].rows = self.rows.push(rows.iter().flatten()),
+            Some(rows) => {
+                self.nodes[id.index()].rows = self.rows.push(rows.iter().flatten());
+                self.nodes[id.index()].n_children = 0;
+            }
             None => self.split(id, ring),
         }
         id
@@ -202,15 +273,15 @@ impl PlanLibrary {
         let rows = self.rows.push(&rows);
         let children: Vec<Child> = quarters
             .into_iter()
-            .map(|(node, points)| Child {
-                node: node.unwrap_or_else(|ring| self.node(&ring)),
-                points: self.rows.push_indices(&points),
+            .map(|Quarter { node, turn, points }| {
+                let node = node.unwrap_or_else(|ring| self.node(&ring));
+                Child { node: node.turned(turn), points: self.rows.push_indices(&points) }
             })
             .collect();
         let n_limits = if n == 4 { 4 } else { 0 };
         let limits: Vec<Limit> = (0..n_limits).map(|k| self.limit(id, ring, rows, &children[k as usize], k)).collect();
         let semi_sharp = ring.tags.iter().any(|t| !t.semi_sharp.is_empty());
-        let node = &mut self.nodes[id.0 as usize];
+        let node = &mut self.nodes[id.index()];
         node.rows = rows;
         node.in_hull = !(self.rules.crease_method == CreaseMethod::Chaikin && semi_sharp);
         (node.children, node.n_children) = (self.children.len() as u32, n);
@@ -231,10 +302,10 @@ impl PlanLibrary {
         }
         let (mut walker, mut key) = (std::mem::take(&mut self.walker), Vec::new());
         let quarters = (0..n).map(|k| {
-            let child = walker.extract(&refined, child_start(n, k), self.outer_tags());
+            let (turn, child) = walker.extract_turned(&refined, child_start(n, k), self.outer_tags());
             let points = child.sources.iter().map(|&v| rows.place_of(&refined, v)).collect();
             child.mesh.key(&mut key);
-            (self.find(&key).ok_or_else(|| walker.take().mesh), points)
+            Quarter { node: self.find(&key).ok_or_else(|| walker.take().mesh), turn, points }
         });
         let quarters = quarters.collect();
         self.walker = walker;
@@ -264,8 +335,8 @@ impl PlanLibrary {
     /// longer, but they are asked for one by one, and would be most of what libraries of semi-sharp meshes hold.
     fn pull_back(&mut self, rows: SparseRows, child: &Child, corner: u32) -> Limit {
         let limit = match self.plan(child.node) {
-            Plan::Regular(_) => Limit::Regular,
-            Plan::Split { limits, .. } => limits[corner as usize],
+            Plan::Regular(..) => Limit::Regular,
+            Plan::Split { limits, .. } => limits.get(corner as usize).expect("quarters have four corners"),
         };
         let Some(position) = limit.position() else { return Limit::Regular };
         let row = self.compose(rows, child, position);
@@ -305,8 +376,14 @@ impl PlanLibrary {
     }
 }
 
-/// A quarter's node, or its ring, and its points.
-type Quarter = (Result<NodeId, LocalMesh>, Vec<u32>);
+/// A quarter that is becoming a child.
+struct Quarter {
+    /// Its node, or its ring if that is new.
+    node: Result<NodeId, LocalMesh>,
+    /// See [`NodeId::turn`].
+    turn: u32,
+    points: Vec<u32>,
+}
 
 /// The rows of a ring's refined points, each made when it is first asked for.
 struct RefinedRows<'a> {

@@ -75,8 +75,21 @@ pub(super) fn one_product(store: &RowStore, rows: SparseRows, i: usize, points: 
     with_rows!(store, rows, |view, _indices| product(simd::Portable, &view, i, points))
 }
 
-pub(super) fn control_points(store: &RowStore, rows: SparseRows, points: &[Point]) -> ControlPoints {
+/// The control points of a regular node, as a face has them that is turned.
+pub(super) fn control_points(store: &RowStore, rows: SparseRows, turn: u32, points: &[Point]) -> ControlPoints {
     let mut control = [Point::ZERO; 16];
     products(store, rows, points, &mut control);
-    control
+    if turn == 0 {
+        return control;
+    }
+    // The node's u runs from the face's corner `turn` to the next one.
+    std::array::from_fn(|place| {
+        let (i, j) = (place % 4, place / 4);
+        let (a, b) = match turn {
+            1 => (j, 3 - i),
+            2 => (3 - i, 3 - j),
+            _ => (3 - j, i),
+        };
+        control[4 * b + a]
+    })
 }

@@ -260,7 +260,7 @@ impl Surface {
         }
         points.ring.clear();
         if size == 4 {
-            let sources = points.walker.sources(&self.topology, first);
+            let sources = points.walker.sources(&self.topology, first + points.node.turn());
             points.ring.extend(sources.iter().map(|&v| self.control_point(v)));
         } else {
             self.load_polygon(face, points);
@@ -449,8 +449,8 @@ fn plan_face(
         return REGULAR;
     }
     let outer_tags = library.read().outer_tags();
-    let ring = &walker.extract(topology, first, outer_tags).mesh;
-    ring.key(key);
+    let (turn, ring) = walker.extract_turned(topology, first, outer_tags);
+    ring.mesh.key(key);
     let known = library.read().find(key);
-    known.unwrap_or_else(|| library.write().node(ring))
+    known.unwrap_or_else(|| library.write().node(&ring.mesh)).turned(turn)
 }
