@@ -248,35 +248,38 @@ impl Numbering {
 }
 
 /// What tells a corner of the target from others: equal for equal corners, and different for most others.
-#[derive(Default)]
+#[derive(Clone, Copy, Default, Debug)]
 struct CornerSign {
-    hash: u64,
+    /// Of the faces around it.
+    layout: u64,
+    /// Of sharpness.
+    tags: u64,
     /// Faces beside the target.
     n_faces: u32,
     has_polygon: bool,
 }
 
+fn add_word(hash: &mut u64, word: u32) {
+    *hash = (hash.rotate_left(5) ^ u64::from(word)).wrapping_mul(0x517c_c1b7_2722_0a95);
+}
+
 impl CornerSign {
+    /// A face in the order of the fan: its number of corners, whether it lies clockwise, and the sharpness of the edge to it.
     #[inline(always)]
-    fn add(&mut self, word: u32) {
-        self.hash = (self.hash.rotate_left(5) ^ u64::from(word)).wrapping_mul(0x517c_c1b7_2722_0a95);
-    }
-
-    /// A face in the order of the fan: its number of corners, or the complement if it lies clockwise.
-    #[inline(always)]
-    fn add_face(&mut self, size: u32) {
+    fn add_face(&mut self, size: u32, is_clockwise: bool, sharpness: f32) {
         self.n_faces += 1;
-        self.has_polygon |= size != 4 && size != u32::MAX - 4;
-        self.add(size);
+        self.has_polygon |= size != 4;
+        add_word(&mut self.layout, 2 * size + u32::from(is_clockwise));
+        if sharpness > 0.0 {
+            add_word(&mut self.tags, self.n_faces);
+            add_word(&mut self.tags, sharpness.to_bits());
+        }
     }
 
-    fn add_tags<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32, tags: &VertexTags) {
-        self.add(tags.sharpness.to_bits());
-        self.add(tags.n_infinite);
-        tags.semi_sharp.iter().for_each(|s| self.add(s.to_bits()));
-        // Which of the edges are sharp: those of the target will do as a rule.
-        self.add(mesh.edge_sharpness(h).to_bits());
-        self.add(mesh.edge_sharpness(mesh.prev(h)).to_bits());
+    fn add_tags(&mut self, tags: &VertexTags) {
+        add_word(&mut self.tags, tags.sharpness.to_bits());
+        add_word(&mut self.tags, tags.n_infinite);
+        tags.semi_sharp.iter().for_each(|s| add_word(&mut self.tags, s.to_bits()));
     }
 
     fn is_irregular(&self, is_closed: bool) -> bool {
@@ -284,9 +287,13 @@ impl CornerSign {
     }
 }
 
-/// The turn of four corners that comes first in the order of their signs.
-fn least_turn(signs: &[u64]) -> u32 {
-    let turned = |t: usize| [0, 1, 2, 3].map(|k| signs[(t + k) % 4]);
+/// The turn of four corners that comes first in the order of their signs: of layouts first, so that rings that differ in
+/// sharpness only are turned alike and have rows in common.
+fn least_turn(signs: &[CornerSign]) -> u32 {
+    let turned = |t: usize| {
+        let corners = [0, 1, 2, 3].map(|k| signs[(t + k) % 4]);
+        (corners.map(|c| c.layout), corners.map(|c| c.tags))
+    };
     (1..4).fold(0, |best, t| if turned(t) < turned(best) { t } else { best }) as u32
 }
 
@@ -300,7 +307,7 @@ pub struct RingWalker {
     half_edges: Vec<u32>,
     /// Tags of the target's corners, and what tells the corners apart.
     corner_tags: Vec<VertexTags>,
-    corner_signs: Vec<u64>,
+    corner_signs: Vec<CornerSign>,
     /// Whether something at a corner is known not to be regular.
     is_irregular: bool,
     ring: Extracted,
@@ -400,13 +407,13 @@ impl RingWalker {
             let is_closed = self.add_fan::<M, SIGNED>(mesh, h, tags.n_infinite >= 2, &mut sign);
             let is_plain = tags == VertexTags { n_infinite: if is_closed { 0 } else { 2 }, ..Default::default() };
             if SIGNED && !is_plain {
-                sign.add_tags(mesh, h, &tags);
+                sign.add_tags(&tags);
             }
             let is_semi_sharp = !tags.semi_sharp.is_empty() || (tags.sharpness > 0.0 && tags.sharpness.is_finite());
             self.is_irregular |= sign.is_irregular(is_closed) || is_semi_sharp;
             self.corner_tags.push(tags);
         }
-        self.corner_signs.push(sign.hash);
+        self.corner_signs.push(sign);
     }
 
     /// Returns whether the faces close around the corner.
@@ -418,6 +425,8 @@ impl RingWalker {
         cut: bool,
         sign: &mut CornerSign,
     ) -> bool {
+        let is_plain = mesh.is_plain(h);
+        let sharpness = |e: u32| if is_plain { 0.0 } else { mesh.edge_sharpness(e) };
         let mut spoke = h;
         loop {
             let arriving = mesh.prev(spoke);
@@ -430,15 +439,16 @@ impl RingWalker {
             }
             self.add_face(mesh, spoke);
             if SIGNED {
-                sign.add_face(mesh.face_corners(mesh.face(spoke)).1);
+                sign.add_face(mesh.face_corners(mesh.face(spoke)).1, false, sharpness(arriving));
             }
         }
         spoke = h;
         while !is_border(mesh, spoke, cut) {
+            let crossed = spoke;
             spoke = mesh.next(mesh.twin(spoke));
             self.add_face(mesh, spoke);
             if SIGNED {
-                sign.add_face(u32::MAX - mesh.face_corners(mesh.face(spoke)).1);
+                sign.add_face(mesh.face_corners(mesh.face(spoke)).1, true, sharpness(crossed));
             }
         }
         false

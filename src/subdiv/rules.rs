@@ -510,6 +510,15 @@ impl HalfEdges for RefinedView<'_> {
         refined_tags(&self.rules, self.ring, self.origin[self.vertex(h) as usize])
     }
 
+    fn is_plain(&self, h: u32) -> bool {
+        match self.origin[self.vertex(h) as usize] {
+            Origin::Face(_) => true,
+            Origin::Edge(e) => self.ring.twin(e) == NONE || self.ring.edge_sharpness(e) == 0.0,
+            Origin::Vertex(e) => *self.ring.tags_at(e) == VertexTags::default(),
+            Origin::Middle(_) | Origin::Nothing => false,
+        }
+    }
+
     fn crease_ends(&self, h: u32) -> Option<[u32; 2]> {
         let v = self.vertex(h);
         self.fins.iter().find(|fin| fin.0 == v).map(|fin| fin.1)

@@ -9,7 +9,7 @@ use crate::math::Bounds;
 use glam::Vec3;
 
 /// Boxes of which all three orders are compared; of more, slabs along the longest axis are.
-const MOST_SORTED: usize = 64;
+const MOST_SORTED: usize = 32;
 
 /// Slabs of centres that are compared.
 const N_BINS: usize = 16;
