@@ -1,12 +1,12 @@
 //! Lattice vertices of a rectangle of cells, as dicing leaves them and pieces are written from them.
 
+use super::point_grid::{LANES, PointGrid, row_stride};
 use super::simd::{self, Kernel, Task};
 
 /// Integers that can be read from the start of any row, whatever its length.
 pub const WINDOW: usize = 12;
 
-/// Lattice vertices in rows, one list for each axis. After the last column of a row its vertex is repeated, once at least,
-/// up to a multiple of four.
+/// Lattice vertices in rows, one list for each axis. After the last column of a row its vertex is repeated once.
 #[derive(Clone, Debug, Default)]
 pub struct LatticeGrid {
     columns: usize,
@@ -14,8 +14,6 @@ pub struct LatticeGrid {
     stride: usize,
     /// `WINDOW` more than `rows * stride` integers each.
     axes: [Vec<i32>; 3],
-    /// For each four vertices, which of them lie within the guard of a rounding boundary.
-    near: Vec<u8>,
 }
 
 impl LatticeGrid {
@@ -33,12 +31,11 @@ impl LatticeGrid {
     fn reset(&mut self, columns: usize, rows: usize) {
         self.columns = columns;
         self.rows = rows;
-        self.stride = (columns + 1).next_multiple_of(4);
+        self.stride = row_stride(columns);
         let n = rows * self.stride + WINDOW;
         for axis in &mut self.axes {
             axis.resize(n, 0);
         }
-        self.near.resize(rows * self.stride / 4, 0);
     }
 
     /// Columns and rows.
@@ -58,7 +55,7 @@ impl LatticeGrid {
     /// Replaces vertex (i, j).
     pub fn set(&mut self, i: usize, j: usize, p: [i32; 3]) {
         let at = j * self.stride + i;
-        let end = if i + 1 == self.columns { (j + 1) * self.stride } else { at + 1 };
+        let end = if i + 1 == self.columns { at + 2 } else { at + 1 };
         for (axis, x) in self.axes.iter_mut().zip(p) {
             axis[at..end].fill(x);
         }
@@ -75,17 +72,11 @@ impl LatticeGrid {
         self.axes[axis][j * self.stride..].first_chunk().expect("room after the last row")
     }
 
-    /// Takes points, i fastest, `columns` to a row, and rounds them to whole numbers.
-    pub fn round<P: AsRef<[f64; 4]>>(&mut self, points: &[P], columns: usize, rounding: Rounding) {
-        self.reset(columns, points.len() / columns);
+    /// Takes points and rounds them to whole numbers.
+    pub fn round(&mut self, points: &PointGrid, rounding: Rounding) {
+        let [columns, rows] = points.size();
+        self.reset(columns, rows);
         simd::run(Round { points, rounding, grid: self });
-    }
-
-    /// Whether vertex (i, j) was within the guard of a rounding boundary.
-    #[inline(always)]
-    pub fn is_near(&self, i: usize, j: usize) -> bool {
-        let at = j * self.stride + i;
-        self.near[at / 4] >> (at % 4) & 1 == 1
     }
 }
 
@@ -94,40 +85,73 @@ impl LatticeGrid {
 pub struct Rounding {
     /// Added before.
     pub shift: f64,
-    /// A vertex with a coordinate this near to a rounding boundary is told by [`LatticeGrid::is_near`].
+    /// [`Rounding::near`] tells which vertices have a coordinate this near to a rounding boundary.
     pub guard: f64,
 }
 
-struct Round<'a, P> {
-    points: &'a [P],
+/// Vertices that [`Rounding::near`] looks at, at most.
+pub const MOST_NEAR: usize = 32;
+
+impl Rounding {
+    /// Which of `n` (up to [`MOST_NEAR`]) vertices from (i, j) on, along axis 0 or 1 of the grid, have a coordinate within
+    /// the guard of a rounding boundary, as bits.
+    pub fn near(self, points: &PointGrid, from: [usize; 2], along: usize, n: usize) -> u32 {
+        debug_assert!(n <= MOST_NEAR);
+        let step = if along == 0 { 1 } else { points.stride() };
+        simd::run(Near { points, rounding: self, first: from[1] * points.stride() + from[0], step, n })
+    }
+}
+
+struct Near<'a> {
+    points: &'a PointGrid,
+    rounding: Rounding,
+    first: usize,
+    step: usize,
+    n: usize,
+}
+
+impl Task for Near<'_> {
+    type Output = u32;
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> u32 {
+        let Self { points, rounding: Rounding { shift, guard }, first, step, n } = self;
+        let (shift, low, high) = (k.splat4(shift + 0.5), k.splat4(guard), k.splat4(1.0 - guard));
+        let mut mask = 0;
+        for axis in 0..3 {
+            let numbers = &points.axis(axis)[first..];
+            for i in (0..n).step_by(LANES) {
+                let mut four = [0.0; LANES];
+                for (lane, x) in four.iter_mut().enumerate() {
+                    *x = numbers[(i + lane).min(n - 1) * step];
+                }
+                let shifted = k.add4(k.load4(&four), shift);
+                let fraction = k.sub4(shifted, k.floor4(shifted));
+                mask |= (k.lt4(fraction, low) | k.lt4(high, fraction)) << i;
+            }
+        }
+        mask & (u32::MAX >> (MOST_NEAR - n))
+    }
+}
+
+struct Round<'a> {
+    points: &'a PointGrid,
     rounding: Rounding,
     grid: &'a mut LatticeGrid,
 }
 
-impl<P: AsRef<[f64; 4]>> Task for Round<'_, P> {
+impl Task for Round<'_> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) {
-        let LatticeGrid { columns, stride, axes, near, .. } = self.grid;
-        let Rounding { shift, guard } = self.rounding;
-        let (shift, low, high) = (k.splat4(shift + 0.5), k.splat4(guard), k.splat4(1.0 - guard));
-        let last = *columns - 1;
-        for (j, row) in self.points.chunks_exact(*columns).enumerate() {
-            for i in (0..*stride).step_by(4) {
-                let [mut a, mut b, mut c, mut d] = [k.splat4(0.0); 4];
-                let mut mask = 0;
-                for (lane, out) in [&mut a, &mut b, &mut c, &mut d].into_iter().enumerate() {
-                    let shifted = k.add4(k.load4(row[(i + lane).min(last)].as_ref()), shift);
-                    *out = k.floor4(shifted);
-                    let fraction = k.sub4(shifted, *out);
-                    let is_near = (k.lt4(fraction, low) | k.lt4(high, fraction)) & 0b111;
-                    mask |= u8::from(is_near != 0) << lane;
-                }
-                let at = j * *stride + i;
-                near[at / 4] = mask;
-                for (axis, four) in axes.iter_mut().zip(k.transposed_integers([a, b, c, d])) {
-                    axis[at..at + 4].copy_from_slice(&four);
-                }
+        let LatticeGrid { columns, rows, stride, axes } = self.grid;
+        let shift = k.splat4(self.rounding.shift + 0.5);
+        for (axis, out) in axes.iter_mut().enumerate() {
+            let out = &mut out[..*rows * *stride];
+            for (out, x) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(self.points.axis(axis).as_chunks().0) {
+                *out = k.integers4(k.floor4(k.add4(k.load4(x), shift)));
+            }
+            for row in out.chunks_exact_mut(*stride) {
+                row[*columns] = row[*columns - 1];
             }
         }
     }
@@ -137,30 +161,37 @@ impl<P: AsRef<[f64; 4]>> Task for Round<'_, P> {
 mod tests {
     use super::*;
 
-    struct Point([f64; 4]);
-
-    impl AsRef<[f64; 4]> for Point {
-        fn as_ref(&self) -> &[f64; 4] {
-            &self.0
+    #[test]
+    fn points_round_to_the_nearest_and_tell_when_they_are_near_a_boundary() {
+        let rounding = Rounding { shift: 0.25, guard: 1e-6 };
+        for columns in 1..=9 {
+            let point = |k: usize| [k as f64 * 1.37 - 9.0, 0.25 + 1e-9 * (k % 2) as f64, -0.1];
+            let mut points = PointGrid::default();
+            points.reset(columns, 3);
+            (0..columns * 3).for_each(|k| points.set(k % columns, k / columns, point(k)));
+            let mut grid = LatticeGrid::default();
+            grid.round(&points, rounding);
+            for k in 0..columns * 3 {
+                let (i, j) = (k % columns, k / columns);
+                assert_eq!(grid.point(i, j), point(k).map(|x| (x + 0.75).floor() as i32));
+                assert_eq!(grid.window(0, j)[columns], grid.point(columns - 1, j)[0], "the last one is repeated");
+            }
+            assert_eq!(rounding.near(&points, [0, 1], 0, columns), (1 << columns) - 1, "y lies on a boundary");
+            assert_eq!(grid.points().count(), columns * 3);
         }
     }
 
     #[test]
-    fn points_round_to_the_nearest_and_tell_when_they_are_near_a_boundary() {
-        for columns in 1..=9 {
-            let point = |k: usize| Point([k as f64 * 1.37 - 9.0, 0.25 + 1e-9 * (k % 2) as f64, -0.1, 0.0]);
-            let points: Vec<Point> = (0..columns * 3).map(point).collect();
-            let mut grid = LatticeGrid::default();
-            grid.round(&points, columns, Rounding { shift: 0.25, guard: 1e-6 });
-            for (k, p) in points.iter().enumerate() {
-                let (i, j) = (k % columns, k / columns);
-                let rounded = p.0.map(|x| (x + 0.75).floor() as i32);
-                assert_eq!(grid.point(i, j), rounded[..3]);
-                assert!(grid.is_near(i, j), "y lies on a boundary");
-                assert_eq!(grid.window(0, j)[columns], grid.point(columns - 1, j)[0], "the last one is repeated");
-            }
-            assert_eq!(grid.points().count(), points.len());
+    fn single_points_are_told_to_be_near_a_boundary() {
+        let rounding = Rounding { shift: 0.25, guard: 1e-6 };
+        let mut points = PointGrid::default();
+        points.reset(5, 7);
+        for k in 0..35 {
+            points.set(k % 5, k / 5, [7.0, -3.1, if k % 3 == 0 { 0.25 - 1e-9 } else { 0.3 }]);
         }
+        let bits = |at: &dyn Fn(usize) -> usize, n: usize| (0..n).filter(|&k| at(k) % 3 == 0).fold(0, |m, k| m | 1 << k);
+        assert_eq!(rounding.near(&points, [1, 2], 0, 4), bits(&|k| 11 + k, 4));
+        assert_eq!(rounding.near(&points, [4, 1], 1, 6), bits(&|k| 9 + 5 * k, 6));
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! Small mathematics that the rest shares: boxes, rays and lanes of eight floats. Vectors are glam's.
 
 mod bounds;
-mod lattice_grid;
+pub mod lattice_grid;
+pub mod point_grid;
 mod ray;
 pub mod simd;
 
 pub use bounds::{Bounds, DBounds};
 pub use lattice_grid::{LatticeGrid, Rounding, WINDOW};
+pub use point_grid::PointGrid;
 pub use ray::{Hit, Intersect, OnTriangle, PrimitiveRef, Ray};

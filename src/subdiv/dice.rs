@@ -10,10 +10,11 @@
 //! the other just outside, they still agree: the owner's value lies within the evaluation error, far less than the
 //! guard, of one that is a whole guard away from the boundary.
 
-use super::eval::{Evaluator, Point, SurfaceSample};
+use super::eval::{Evaluator, SurfaceSample};
 use super::surface::{PatchPoints, Surface};
 use crate::ids::{FaceId, PatchId};
-use crate::math::{Bounds, LatticeGrid, Rounding};
+use crate::math::lattice_grid::MOST_NEAR;
+use crate::math::{Bounds, LatticeGrid, PointGrid, Rounding};
 use crate::topology::HalfEdges;
 use glam::{DVec3, Vec3};
 
@@ -27,6 +28,8 @@ pub const GUARD: f64 = 1.0 / 65536.0;
 /// Added before rounding: mesh coordinates are often dyadic fractions, whose halves would lie on rounding boundaries all
 /// the time; a third is far from all of them.
 pub const LATTICE_SHIFT: f64 = 1.0 / 3.0;
+
+const ROUNDING: Rounding = Rounding { shift: LATTICE_SHIFT, guard: GUARD };
 
 /// Largest rate of an edge.
 pub const MAX_RATE: u32 = 4096;
@@ -131,7 +134,10 @@ const N_REMEMBERED: usize = 16;
 pub struct Dicer {
     points: [PatchPoints; N_REMEMBERED],
     evaluator: Evaluator,
-    out: Vec<Point>,
+    /// The points of the part that is diced.
+    out: PointGrid,
+    /// A point that is evaluated alone.
+    single: PointGrid,
     owner: OwnerScratch,
 }
 
@@ -139,6 +145,7 @@ pub struct Dicer {
 struct OwnerScratch {
     points: PatchPoints,
     evaluator: Evaluator,
+    single: PointGrid,
 }
 
 /// A lattice coordinate, and whether it was within the guard of the next one.
@@ -151,8 +158,8 @@ fn round(x: f64) -> (i32, bool) {
 }
 
 #[inline(always)]
-fn round_point(p: Point) -> ([i32; 3], bool) {
-    let (x, y, z) = (round(p.0[0]), round(p.0[1]), round(p.0[2]));
+fn round_point(p: [f64; 3]) -> ([i32; 3], bool) {
+    let (x, y, z) = (round(p[0]), round(p[1]), round(p[2]));
     ([x.0, y.0, z.0], x.1 | y.1 | z.1)
 }
 
@@ -193,14 +200,11 @@ impl Dicer {
         out: &mut LatticeGrid,
     ) {
         let lane = self.load(surface, patch);
-        let (n_i, n_j) = ((i1 - i0 + 1) as usize, (j1 - j0 + 1) as usize);
-        self.out.clear();
-        self.out.resize(n_i * n_j, Point::ZERO);
         let (n_u, n_v) = (f64::from(rates.n_u), f64::from(rates.n_v));
         let us = (i0..=i1).map(|i| f64::from(i) / n_u);
         let vs = (j0..=j1).map(|j| f64::from(j) / n_v);
         surface.grid(&self.points[lane], &mut self.evaluator, us, vs, &mut self.out);
-        out.round(&self.out, n_i, Rounding { shift: LATTICE_SHIFT, guard: GUARD });
+        out.round(&self.out, ROUNDING);
         for side in [0, 2, 3, 1] {
             self.settle_side(surface, patch, rates, side, [[i0, i1], [j0, j1]], out);
         }
@@ -224,17 +228,27 @@ impl Dicer {
             return;
         }
         let across = if is_far { (far - near) as usize } else { 0 };
-        for index in first..=last {
-            let along = (index - first) as usize;
-            let place = if axis == 0 { [along, across] } else { [across, along] };
-            self.settle(surface, patch, rates, SidePoint { side, index, rate: n[axis] }, place, out);
+        let place = |along: usize| if axis == 0 { [along, across] } else { [across, along] };
+        let at = |along: usize| SidePoint { side, index: first + along as u32, rate: n[axis] };
+        let n_points = (last - first + 1) as usize;
+        if rates.sides[side] != n[axis] {
+            (0..n_points).for_each(|along| self.snap(surface, patch, rates, at(along), place(along), out));
+            return;
+        }
+        for start in (0..n_points).step_by(MOST_NEAR) {
+            let mut near = ROUNDING.near(&self.out, place(start), axis, (n_points - start).min(MOST_NEAR));
+            while near != 0 {
+                let along = start + near.trailing_zeros() as usize;
+                let [i, j] = place(along);
+                out.set(i, j, self.owner.side_point(surface, patch, rates, at(along)));
+                near &= near - 1;
+            }
         }
     }
 
-    /// Makes a border vertex what both sides agree on: a point of the edge, and its owner's rounding where theirs could
-    /// differ. `vertex` counts in cells of the grid, `place` is where it stands in `out`.
-    #[inline]
-    fn settle(
+    /// Moves a border vertex to a point of an edge that has fewer segments than the grid. `vertex` counts in cells of the
+    /// grid, the last place is where it stands in `out`.
+    fn snap(
         &mut self,
         surface: &Surface,
         patch: PatchId,
@@ -244,12 +258,8 @@ impl Dicer {
         out: &mut LatticeGrid,
     ) {
         let rate = rates.sides[vertex.side];
-        if rate != vertex.rate {
-            let at = SidePoint { index: snapped(vertex.index, vertex.rate, rate), rate, ..vertex };
-            out.set(i, j, self.snapped_vertex(surface, patch, rates, at));
-        } else if out.is_near(i, j) {
-            out.set(i, j, self.owner.side_point(surface, patch, rates, vertex));
-        }
+        let at = SidePoint { index: snapped(vertex.index, vertex.rate, rate), rate, ..vertex };
+        out.set(i, j, self.snapped_vertex(surface, patch, rates, at));
     }
 
     /// The vertex at a point of a side that has fewer segments than the grid.
@@ -269,11 +279,10 @@ impl Dicer {
         lane
     }
 
-    fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> Point {
+    fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> [f64; 3] {
         let lane = self.load(surface, patch);
-        let mut p = [Point::ZERO];
-        surface.grid(&self.points[lane], &mut self.evaluator, [u], [v], &mut p);
-        p[0]
+        surface.grid(&self.points[lane], &mut self.evaluator, [u], [v], &mut self.single);
+        self.single.point(0, 0)
     }
 
     /// Position and tangents at a point of a patch, in lattice units without [`LATTICE_SHIFT`].
@@ -411,8 +420,7 @@ impl OwnerScratch {
 
     fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> [i32; 3] {
         surface.load(patch, &mut self.points);
-        let mut p = [Point::ZERO];
-        surface.grid(&self.points, &mut self.evaluator, [u], [v], &mut p);
-        round_point(p[0]).0
+        surface.grid(&self.points, &mut self.evaluator, [u], [v], &mut self.single);
+        round_point(self.single.point(0, 0)).0
     }
 }

@@ -3,8 +3,9 @@
 use super::bounds::HullWeights;
 use super::plan::{Child, Children, Limit, Limits, NodeId, Plan, PlanLibrary};
 use super::products::{child_points, control_points, one_product, products};
-use super::regular::{self, ControlPoints};
+use super::regular::{self, Basis, ControlPoints};
 use super::rows::SparseRows;
+use crate::math::PointGrid;
 use crate::math::simd;
 use glam::DVec3;
 use std::ops::{Add, Mul, Sub};
@@ -103,7 +104,7 @@ pub struct Evaluator {
     /// Ring points of all levels of the current walk, a stack.
     pub(super) points: Vec<Point>,
     /// Basis function values of a regular part, for u then v.
-    basis: Vec<[f64; 4]>,
+    basis: Vec<Basis>,
     /// Parameters of all levels, a stack.
     params: Vec<f64>,
     pub(super) hulls: HullWeights,
@@ -115,15 +116,18 @@ pub(super) struct Target {
     /// Ranges in `Evaluator::params`.
     us: (usize, usize),
     vs: (usize, usize),
-    /// Index of the first point and distance between rows in the output.
-    first: usize,
-    stride: usize,
+    /// The first point in the output.
+    first: [usize; 2],
 }
 
 /// Where a polygon's child or a quad's quarter lies: its corner in units of its size.
 pub(super) fn quarter(k: usize) -> (f64, f64) {
     [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][k]
 }
+
+/// The quarters of a quad in an order in which the left one of two neighbours comes first: writing a row's points, four at
+/// a time, may spoil what is to the right of them.
+pub(super) const LEFT_FIRST: [usize; 4] = [0, 1, 3, 2];
 
 fn exact_corner(u: f64, v: f64) -> Option<usize> {
     match (u, v) {
@@ -137,7 +141,7 @@ fn exact_corner(u: f64, v: f64) -> Option<usize> {
 
 impl Evaluator {
     /// Positions at all pairs of `us` and `vs` (each ascending, in 0..=1) of the patch that starts at `node` with ring
-    /// points `ring`; `out[j * us.len() + i]` is at `(us[i], vs[j])`.
+    /// points `ring`; point (i, j) of `out` is at `(us[i], vs[j])`.
     pub fn grid(
         &mut self,
         library: &PlanLibrary,
@@ -145,10 +149,10 @@ impl Evaluator {
         ring: &[Point],
         us: impl IntoIterator<Item = f64>,
         vs: impl IntoIterator<Item = f64>,
-        out: &mut [Point],
+        out: &mut PointGrid,
     ) {
         let ring = self.start_ring(ring);
-        let target = self.start_grid(us, vs);
+        let target = self.start_grid(us, vs, out);
         self.walk(library, node, ring, 0, target, out);
     }
 
@@ -159,17 +163,20 @@ impl Evaluator {
         0
     }
 
-    /// Forgets other parameters; returns the whole grid.
+    /// Forgets other parameters and makes room for their points; returns the whole grid.
     pub(super) fn start_grid(
         &mut self,
         us: impl IntoIterator<Item = f64>,
         vs: impl IntoIterator<Item = f64>,
+        out: &mut PointGrid,
     ) -> Target {
         self.params.clear();
         self.params.extend(us);
         let n_u = self.params.len();
         self.params.extend(vs);
-        Target { us: (0, n_u), vs: (n_u, self.params.len()), first: 0, stride: n_u }
+        let n = self.params.len();
+        out.reset(n_u, n - n_u);
+        Target { us: (0, n_u), vs: (n_u, n), first: [0, 0] }
     }
 
     /// As [`grid`](Self::grid) for 16 B-spline control points.
@@ -178,9 +185,9 @@ impl Evaluator {
         control: &ControlPoints,
         us: impl IntoIterator<Item = f64>,
         vs: impl IntoIterator<Item = f64>,
-        out: &mut [Point],
+        out: &mut PointGrid,
     ) {
-        let target = self.start_grid(us, vs);
+        let target = self.start_grid(us, vs, out);
         self.regular(control, target, out);
     }
 
@@ -191,7 +198,7 @@ impl Evaluator {
         ring: usize,
         depth: u32,
         target: Target,
-        out: &mut [Point],
+        out: &mut PointGrid,
     ) {
         let (rows, children, limits) = match library.plan(node) {
             Plan::Regular(rows, turn) => {
@@ -215,7 +222,7 @@ impl Evaluator {
         let start = self.points.len();
         let refined = if quarters.count_ones() > 1 { Some(self.refine(library, rows, ring)) } else { None };
         let marks = (self.points.len(), self.params.len());
-        for k in (0..4).filter(|k| quarters >> k & 1 == 1) {
+        for k in LEFT_FIRST.into_iter().filter(|k| quarters >> k & 1 == 1) {
             let child = &children.get(k);
             let part = self.quarter_target(&target, middle, k);
             let child_ring = match refined {
@@ -232,7 +239,14 @@ impl Evaluator {
 
     /// Corners whose limit is known here, in place of what deeper parts made of them: a point alone comes no further than
     /// this, and must not depend on its company.
-    fn set_corners(&self, library: &PlanLibrary, limits: Limits<'_>, ring: usize, target: &Target, out: &mut [Point]) {
+    fn set_corners(
+        &self,
+        library: &PlanLibrary,
+        limits: Limits<'_>,
+        ring: usize,
+        target: &Target,
+        out: &mut PointGrid,
+    ) {
         let (n_u, n_v) = (target.us.1 - target.us.0, target.vs.1 - target.vs.0);
         for k in 0..4 {
             let Some(limit) = limits.get(k) else { continue };
@@ -241,7 +255,7 @@ impl Evaluator {
             let is_wanted = self.params[target.us.0 + i] == x && self.params[target.vs.0 + j] == y;
             if let (true, Some(row)) = (is_wanted, limit.position()) {
                 let p = one_product(library.rows(), row, 0, &self.points[ring..]);
-                out[target.first + j * target.stride + i] = p;
+                out.set(target.first[0] + i, target.first[1] + j, p.to_vec().to_array());
             }
         }
     }
@@ -259,10 +273,10 @@ impl Evaluator {
         let (x, y) = quarter(k);
         let us = if x == 0.0 { (target.us.0, middle.0) } else { (middle.0, target.us.1) };
         let vs = if y == 0.0 { (target.vs.0, middle.1) } else { (middle.1, target.vs.1) };
-        let first = target.first + (us.0 - target.us.0) + (vs.0 - target.vs.0) * target.stride;
+        let first = [target.first[0] + us.0 - target.us.0, target.first[1] + vs.0 - target.vs.0];
         let us = self.push_params(us, x);
         let vs = self.push_params(vs, y);
-        Target { us, vs, first, stride: target.stride }
+        Target { us, vs, first }
     }
 
     pub(super) fn n_params(&self) -> usize {
@@ -273,10 +287,11 @@ impl Evaluator {
         self.params.truncate(n);
     }
 
-    fn fill(&self, target: Target, p: Point, out: &mut [Point]) {
+    fn fill(&self, target: Target, p: Point, out: &mut PointGrid) {
         for j in 0..target.vs.1 - target.vs.0 {
-            let row = target.first + j * target.stride;
-            out[row..row + target.us.1 - target.us.0].fill(p);
+            for i in 0..target.us.1 - target.us.0 {
+                out.set(target.first[0] + i, target.first[1] + j, p.to_vec().to_array());
+            }
         }
     }
 
@@ -323,12 +338,9 @@ impl Evaluator {
         (start, self.params.len())
     }
 
-    fn regular(&mut self, control: &ControlPoints, target: Target, out: &mut [Point]) {
-        self.basis.clear();
-        let (us, vs) = (&self.params[target.us.0..target.us.1], &self.params[target.vs.0..target.vs.1]);
-        self.basis.extend(us.iter().chain(vs).map(|&t| regular::basis(t)));
-        let (u, v) = self.basis.split_at(us.len());
-        simd::run(regular::Positions { control, u, v, out, first: target.first, stride: target.stride });
+    fn regular(&mut self, control: &ControlPoints, target: Target, out: &mut PointGrid) {
+        let (u, v) = (&self.params[target.us.0..target.us.1], &self.params[target.vs.0..target.vs.1]);
+        simd::run(regular::Positions { control, u, v, out, first: target.first, basis: &mut self.basis });
     }
 
     /// Position and tangents at one point.

@@ -1,6 +1,8 @@
 //! Uniform bicubic B-spline patches: evaluation, derivatives, and the Bézier hull of a part.
 
 use super::eval::Point;
+use crate::math::PointGrid;
+use crate::math::point_grid::LANES;
 use crate::math::simd::{Kernel, Task};
 
 /// 16 control points, u fastest; the patch lies between `[5]`, `[6]`, `[9]` and `[10]`.
@@ -58,28 +60,104 @@ fn column_lanes<K: Kernel>(k: K, c: &ControlPoints, b: &[f64; 4]) -> [K::D; 4] {
     [c0, c1, c2, c3]
 }
 
-/// Positions at all pairs of basis values: `out[first + j * stride + i]` is at `(u[i], v[j])`.
+/// The basis functions' values at four parameters: one list for each function.
+pub(super) type Basis = [[f64; LANES]; 4];
+
+/// [`basis`] at four parameters, by the same operations.
+#[inline(always)]
+fn basis_lanes<K: Kernel>(k: K, t: K::D) -> Basis {
+    let (sixth, three, six, four) = (k.splat4(1.0 / 6.0), k.splat4(3.0), k.splat4(6.0), k.splat4(4.0));
+    let s = k.sub4(k.splat4(1.0), t);
+    let (t2, s2) = (k.mul4(t, t), k.mul4(s, s));
+    let (t3, s3) = (k.mul4(t2, t), k.mul4(s2, s));
+    let inner = [
+        k.add4(k.sub4(k.mul4(three, t3), k.mul4(six, t2)), four),
+        k.add4(k.sub4(k.mul4(three, s3), k.mul4(six, s2)), four),
+    ];
+    [
+        k.store4(k.mul4(sixth, s3)),
+        k.store4(k.mul4(sixth, inner[0])),
+        k.store4(k.mul4(sixth, inner[1])),
+        k.store4(k.mul4(sixth, t3)),
+    ]
+}
+
+/// Appends the basis at parameters, four by four, the last one repeated.
+#[inline(always)]
+fn push_basis<K: Kernel>(k: K, parameters: &[f64], out: &mut Vec<Basis>) {
+    let (fours, rest) = parameters.as_chunks::<LANES>();
+    for four in fours {
+        out.push(basis_lanes(k, k.load4(four)));
+    }
+    if let Some(&last) = rest.last() {
+        let mut four = [last; LANES];
+        four[..rest.len()].copy_from_slice(rest);
+        out.push(basis_lanes(k, k.load4(&four)));
+    }
+}
+
+/// Coordinates of control points, one list of rows for each axis.
+#[inline(always)]
+fn by_axis<K: Kernel>(k: K, c: &ControlPoints) -> [[K::D; 4]; 3] {
+    let zero = k.splat4(0.0);
+    let mut axes = [[zero; 4]; 3];
+    for j in 0..4 {
+        let row = [k.load4(&c[4 * j].0), k.load4(&c[4 * j + 1].0), k.load4(&c[4 * j + 2].0), k.load4(&c[4 * j + 3].0)];
+        let [x, y, z, _] = k.transpose4(row);
+        (axes[0][j], axes[1][j], axes[2][j]) = (x, y, z);
+    }
+    axes
+}
+
+/// Positions at all pairs of parameters: point `first + (i, j)` of `out` is at `(u[i], v[j])`. Up to three numbers behind
+/// each row are overwritten.
 pub(super) struct Positions<'a> {
     pub control: &'a ControlPoints,
-    pub u: &'a [[f64; 4]],
-    pub v: &'a [[f64; 4]],
-    pub out: &'a mut [Point],
-    pub first: usize,
-    pub stride: usize,
+    pub u: &'a [f64],
+    pub v: &'a [f64],
+    pub out: &'a mut PointGrid,
+    pub first: [usize; 2],
+    /// Memory to work in.
+    pub basis: &'a mut Vec<Basis>,
 }
 
 impl Task for Positions<'_> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) {
-        for (j, v) in self.v.iter().enumerate() {
-            let columns = column_lanes(k, self.control, v);
-            let row = &mut self.out[self.first + j * self.stride..][..self.u.len()];
-            for (p, u) in row.iter_mut().zip(self.u) {
-                *p = Point(k.store4(combine_lanes(k, u, columns)));
+        let Self { control, u, v, out, first: [i0, j0], basis } = self;
+        basis.clear();
+        push_basis(k, u, basis);
+        let n_u = basis.len();
+        push_basis(k, v, basis);
+        let (u, v_basis) = basis.split_at(n_u);
+        let control = by_axis(k, control);
+        for j in 0..v.len() {
+            let four = &v_basis[j / LANES];
+            let lane = j % LANES;
+            let v = [four[0][lane], four[1][lane], four[2][lane], four[3][lane]];
+            for (axis, rows) in control.iter().enumerate() {
+                let curve = k.store4(combine_lanes(k, &v, *rows));
+                let curve = [k.splat4(curve[0]), k.splat4(curve[1]), k.splat4(curve[2]), k.splat4(curve[3])];
+                let row = out.run_mut(axis, [i0, j0 + j], LANES * n_u);
+                for (out, u) in row.as_chunks_mut::<LANES>().0.iter_mut().zip(u) {
+                    *out = k.store4(combine_curve(k, u, curve));
+                }
             }
         }
     }
+}
+
+/// Four points of a curve, one coordinate of each; `curve` is that of its control points.
+#[inline(always)]
+fn combine_curve<K: Kernel>(k: K, u: &Basis, curve: [K::D; 4]) -> K::D {
+    let product = [
+        k.mul4(curve[0], k.load4(&u[0])),
+        k.mul4(curve[1], k.load4(&u[1])),
+        k.mul4(curve[2], k.load4(&u[2])),
+        k.mul4(curve[3], k.load4(&u[3])),
+    ];
+    k.add4(k.add4(k.add4(product[0], product[1]), product[2]), product[3])
 }
 
 /// Weights of four control points for each of four Bézier points.
@@ -188,12 +266,14 @@ mod tests {
     #[test]
     fn every_kernel_gives_the_positions_of_the_plain_sum() {
         let c = control_points();
-        let t: Vec<[f64; 4]> = (0..9).map(|i| basis(f64::from(i) / 8.0)).collect();
-        let mut out = vec![Point::ZERO; 100];
-        run(Positions { control: &c, u: &t, v: &t[2..5], out: &mut out, first: 7, stride: 20 });
-        for (j, v) in t[2..5].iter().enumerate() {
-            for (i, u) in t.iter().enumerate() {
-                assert_eq!(out[7 + 20 * j + i], combine(u, columns(&c, v)));
+        let t: Vec<f64> = (0..9).map(|i| f64::from(i) / 8.0).collect();
+        let mut out = PointGrid::default();
+        out.reset(11, 4);
+        let (u, v) = (&t[..], &t[2..5]);
+        run(Positions { control: &c, u, v, out: &mut out, first: [2, 1], basis: &mut Vec::new() });
+        for (j, &v) in v.iter().enumerate() {
+            for (i, &u) in u.iter().enumerate() {
+                assert_eq!(out.point(2 + i, 1 + j), at(&c, u, v).0[..3]);
             }
         }
     }

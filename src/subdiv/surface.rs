@@ -8,7 +8,7 @@ use super::regular::ControlPoints;
 use super::rules::RuleSet;
 use crate::error::{Error, Result};
 use crate::ids::{FaceId, PatchId};
-use crate::math::DBounds;
+use crate::math::{DBounds, PointGrid};
 use crate::mesh::ControlMesh;
 use crate::topology::{FaceIndex, HalfEdges, NONE, Topology};
 use glam::DVec3;
@@ -295,7 +295,7 @@ impl Surface {
         evaluator: &mut Evaluator,
         us: impl IntoIterator<Item = f64>,
         vs: impl IntoIterator<Item = f64>,
-        out: &mut [Point],
+        out: &mut PointGrid,
     ) {
         if points.node == REGULAR {
             evaluator.regular_grid(&points.control, us, vs, out);

@@ -167,6 +167,26 @@ impl Kernel for Avx2 {
         }
     }
     #[inline(always)]
+    fn integers4(self, x: __m256d) -> [i32; 4] {
+        let mut out = [0; 4];
+        // SAFETY: `self` proves AVX2; `out` is 16 writable bytes and the store needs no alignment.
+        unsafe { _mm_storeu_si128(out.as_mut_ptr().cast(), _mm256_cvttpd_epi32(x)) };
+        out
+    }
+    #[inline(always)]
+    fn transpose4(self, x: [__m256d; 4]) -> [__m256d; 4] {
+        in_registers!({
+            let (ab, cd) = (_mm256_unpacklo_pd(x[0], x[1]), _mm256_unpacklo_pd(x[2], x[3]));
+            let (ab_odd, cd_odd) = (_mm256_unpackhi_pd(x[0], x[1]), _mm256_unpackhi_pd(x[2], x[3]));
+            [
+                _mm256_permute2f128_pd::<0x20>(ab, cd),
+                _mm256_permute2f128_pd::<0x20>(ab_odd, cd_odd),
+                _mm256_permute2f128_pd::<0x31>(ab, cd),
+                _mm256_permute2f128_pd::<0x31>(ab_odd, cd_odd),
+            ]
+        })
+    }
+    #[inline(always)]
     unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> __m256 {
         debug_assert!(at.iter().all(|at| at + if BYTES == 2 { 8 } else { 16 } <= bytes.len()));
         // SAFETY: `self` proves AVX2; the caller promises that the 8 (for BYTES = 2) or 16 bytes from both places are inside `bytes`.

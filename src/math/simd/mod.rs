@@ -82,6 +82,10 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     /// Lanes 0, 1 and 2 of four lists of whole numbers below 2^31 in magnitude: first all lanes 0, then all lanes 1, then all
     /// lanes 2.
     fn transposed_integers(self, x: [Self::D; 4]) -> [[i32; 4]; 3];
+    /// Whole numbers below 2^31 in magnitude as integers.
+    fn integers4(self, x: Self::D) -> [i32; 4];
+    /// Lane i of list k becomes lane k of list i.
+    fn transpose4(self, x: [Self::D; 4]) -> [Self::D; 4];
 
     /// Two runs of four little-endian unsigned integers of `BYTES` bytes each (2, 3 or 4), at `at[0]` and `at[1]`; `base` is added to each
     /// (wrapping) and the sums are converted to floats.

@@ -132,6 +132,14 @@ impl Kernel for Portable {
     fn transposed_integers(self, x: [[f64; 4]; 4]) -> [[i32; 4]; 3] {
         from_fn(|axis| from_fn(|i| x[i][axis] as i32))
     }
+    #[inline(always)]
+    fn integers4(self, x: [f64; 4]) -> [i32; 4] {
+        x.map(|x| x as i32)
+    }
+    #[inline(always)]
+    fn transpose4(self, x: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
+        from_fn(|i| from_fn(|k| x[k][i]))
+    }
     // SAFETY: nothing here relies on the caller's promise: a place outside `bytes` panics. The trait says `unsafe` for kernels
     // that read without looking.
     #[inline(always)]

@@ -74,8 +74,10 @@ impl Task for RoundOfDoubles {
         let whole = |i: u32| k.floor4(k.splat4(f64::from(self.0) * 7.3 - f64::from(i) * 1e5));
         let integers = k.transposed_integers([whole(0), whole(1), a_point(k, self.0), whole(2)]);
         let canonical = |x: f64| if x.is_nan() { f64::NAN.to_bits() } else { x.to_bits() };
-        let lanes = doubles.into_iter().flat_map(|d| k.store4(d).map(canonical));
-        lanes.chain(integers.into_iter().flatten().map(|i| i as u64)).chain([u64::from(k.lt4(a, b))]).collect()
+        let doubles = doubles.into_iter().chain(k.transpose4([a, b, k.floor4(a), k.splat4(7.0)]));
+        let integers = integers.into_iter().chain([k.integers4(whole(3))]);
+        let lanes = doubles.flat_map(|d| k.store4(d).map(canonical));
+        lanes.chain(integers.flatten().map(|i| i as u64)).chain([u64::from(k.lt4(a, b))]).collect()
     }
 }
 

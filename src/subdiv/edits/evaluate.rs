@@ -1,9 +1,9 @@
 //! Evaluating patches under edits: down the quadtree, then as any plan.
 
 use super::EditTree;
-use crate::math::DBounds;
+use crate::math::{DBounds, PointGrid};
 use crate::subdiv::bounds::half_range;
-use crate::subdiv::eval::{Evaluator, Point, SurfaceSample, Target, quarter, quarters_of};
+use crate::subdiv::eval::{Evaluator, LEFT_FIRST, SurfaceSample, Target, quarter, quarters_of};
 use crate::subdiv::plan::PlanLibrary;
 
 impl Evaluator {
@@ -14,13 +14,13 @@ impl Evaluator {
         tree: &EditTree,
         us: impl IntoIterator<Item = f64>,
         vs: impl IntoIterator<Item = f64>,
-        out: &mut [Point],
+        out: &mut PointGrid,
     ) {
-        let target = self.start_grid(us, vs);
+        let target = self.start_grid(us, vs, out);
         self.walk_tree(library, tree, 0, target, out);
     }
 
-    fn walk_tree(&mut self, library: &PlanLibrary, tree: &EditTree, depth: u32, target: Target, out: &mut [Point]) {
+    fn walk_tree(&mut self, library: &PlanLibrary, tree: &EditTree, depth: u32, target: Target, out: &mut PointGrid) {
         match tree {
             EditTree::Rest { node, ring } => {
                 let ring = self.start_ring(ring);
@@ -29,7 +29,7 @@ impl Evaluator {
             EditTree::Split(quarters) => {
                 let middle = self.middle(&target);
                 let wanted = quarters_of(&target, middle);
-                for (k, tree) in quarters.iter().enumerate().filter(|(k, _)| wanted >> k & 1 == 1) {
+                for (k, tree) in LEFT_FIRST.map(|k| (k, &quarters[k])).into_iter().filter(|(k, _)| wanted >> k & 1 == 1) {
                     let mark = self.n_params();
                     let part = self.quarter_target(&target, middle, k);
                     self.walk_tree(library, tree, depth + 1, part, out);
