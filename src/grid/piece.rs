@@ -114,20 +114,25 @@ struct BlockBoxes<'a> {
 impl Task for BlockBoxes<'_> {
     type Output = (IntegerBox, LaneBoxes);
     #[inline(always)]
-    fn run<K: Kernel>(self, _: K) -> (IntegerBox, LaneBoxes) {
+    fn run<K: Kernel>(self, k: K) -> (IntegerBox, LaneBoxes) {
         let [n_a, n_b] = self.lanes.map(usize::from);
         let last_row = self.vertices.size()[1] - 1;
         let mut boxes = LaneBoxes { low: [[0; 16]; 3], high: [[0; 16]; 3] };
         let [mut lowest, mut highest] = [[i32::MAX; 3], [i32::MIN; 3]];
-        for (axis, (lowest, highest)) in lowest.iter_mut().zip(&mut highest).enumerate() {
+        for axis in 0..3 {
+            let row = |j: usize| self.vertices.window(axis, j.min(last_row));
+            let (mut below_low, mut below_high) = min_max_of_threes(k, row(0));
             for b in 0..n_b {
-                let row = |j: usize| self.vertices.window(axis, j.min(last_row));
-                let (low, high) = min_max(row(2 * b), row(2 * b + 1), row(2 * b + 2));
+                let (low_1, high_1) = min_max_of_threes(k, row(2 * b + 1));
+                let (low_2, high_2) = min_max_of_threes(k, row(2 * b + 2));
+                let low = k.even_lanes(k.min_i(k.min_i(below_low, low_1), low_2));
+                let high = k.even_lanes(k.max_i(k.max_i(below_high, high_1), high_2));
+                (below_low, below_high) = (low_2, high_2);
+                boxes.low[axis][4 * b..4 * b + 4].copy_from_slice(&low);
+                boxes.high[axis][4 * b..4 * b + 4].copy_from_slice(&high);
                 for a in 0..n_a {
-                    let least = low[2 * a].min(low[2 * a + 1]).min(low[2 * a + 2]);
-                    let greatest = high[2 * a].max(high[2 * a + 1]).max(high[2 * a + 2]);
-                    (boxes.low[axis][4 * b + a], boxes.high[axis][4 * b + a]) = (least, greatest);
-                    (*lowest, *highest) = ((*lowest).min(least), (*highest).max(greatest));
+                    lowest[axis] = lowest[axis].min(low[a]);
+                    highest[axis] = highest[axis].max(high[a]);
                 }
             }
         }
@@ -135,15 +140,17 @@ impl Task for BlockBoxes<'_> {
     }
 }
 
-/// The least and the greatest of three rows, column by column.
+/// The least and the greatest of each three numbers of a row that follow each other, from the first eight on.
 #[inline(always)]
-fn min_max(a: &[i32; WINDOW], b: &[i32; WINDOW], c: &[i32; WINDOW]) -> ([i32; WINDOW], [i32; WINDOW]) {
-    let (mut low, mut high) = (*a, *a);
-    for i in 0..WINDOW {
-        low[i] = low[i].min(b[i]).min(c[i]);
-        high[i] = high[i].max(b[i]).max(c[i]);
-    }
-    (low, high)
+fn min_max_of_threes<K: Kernel>(k: K, row: &[i32; WINDOW]) -> (K::I, K::I) {
+    let [a, b, c] = [eight(k, row, 0), eight(k, row, 1), eight(k, row, 2)];
+    (k.min_i(k.min_i(a, b), c), k.max_i(k.max_i(a, b), c))
+}
+
+/// Eight numbers of a row.
+#[inline(always)]
+fn eight<K: Kernel>(k: K, row: &[i32; WINDOW], from: usize) -> K::I {
+    k.load_i(row[from..].first_chunk().expect("a window is longer"))
 }
 
 /// Writes a block.
@@ -156,54 +163,58 @@ struct Encode<'a> {
 impl Task for Encode<'_> {
     type Output = ();
     #[inline(always)]
-    fn run<K: Kernel>(self, _: K) {
+    fn run<K: Kernel>(self, k: K) {
         let Self { layout: PieceLayout { cells, grid, whole, boxes, format }, vertices, out } = self;
         let head = Head::new(*whole, boxes, lanes(*cells), *cells, *grid, *format as u8);
         out[..HEAD_BYTES].copy_from_slice(bytemuck::bytes_of(&head));
         match format {
-            VertexFormat::Two => write_rows::<2>(vertices, whole[0], lanes(*cells), out),
-            VertexFormat::Three => write_rows::<3>(vertices, whole[0], lanes(*cells), out),
-            VertexFormat::Four => write_rows::<4>(vertices, whole[0], lanes(*cells), out),
+            VertexFormat::Two => write_rows::<2, K>(k, vertices, whole[0], lanes(*cells), out),
+            VertexFormat::Three => write_rows::<3, K>(k, vertices, whole[0], lanes(*cells), out),
+            VertexFormat::Four => write_rows::<4, K>(k, vertices, whole[0], lanes(*cells), out),
         }
     }
 }
 
 /// Writes row after row: its x, its y, its z.
 #[inline(always)]
-fn write_rows<const BYTES: usize>(vertices: &LatticeGrid, low: [i32; 3], lanes: [u8; 2], out: &mut [u8]) {
+fn write_rows<const BYTES: usize, K: Kernel>(
+    k: K,
+    vertices: &LatticeGrid,
+    low: [i32; 3],
+    lanes: [u8; 2],
+    out: &mut [u8],
+) {
     let [columns, n_rows] = lanes.map(|n| 2 * usize::from(n) + 1);
     let last_row = vertices.size()[1] - 1;
     let mut at = HEAD_BYTES;
     for j in 0..n_rows {
         for (axis, &low) in low.iter().enumerate() {
-            let mut offsets = *vertices.window(axis, j.min(last_row));
-            for x in &mut offsets {
-                *x = x.wrapping_sub(low);
+            let row = vertices.window(axis, j.min(last_row));
+            if BYTES == 2 {
+                write_narrow_row(k, row, low, columns, &mut out[at..]);
+            } else {
+                for (x, place) in row[..columns].iter().zip(out[at..].chunks_exact_mut(BYTES)) {
+                    place.copy_from_slice(&x.wrapping_sub(low).to_le_bytes()[..BYTES]);
+                }
             }
-            write_row::<BYTES>(&offsets, columns, &mut out[at..]);
             at += BYTES * columns;
         }
     }
     out[at..].fill(0);
 }
 
-/// Writes the first `columns` numbers and, where there is room, what comes after them: the next row will replace it.
+/// Writes the first `columns` numbers, up to nine, as offsets from `low` in two bytes, and where there is room what comes
+/// after them: the next row will replace it.
 #[inline(always)]
-fn write_row<const BYTES: usize>(offsets: &[i32; WINDOW], columns: usize, out: &mut [u8]) {
-    if BYTES == 2 {
-        let mut narrow = [0u16; WINDOW];
-        for (narrow, x) in narrow.iter_mut().zip(offsets) {
-            *narrow = (*x as u16).to_le();
-        }
-        let bytes: &[u8; 2 * WINDOW] = bytemuck::cast_ref(&narrow);
-        match out.first_chunk_mut() {
-            Some(whole) => *whole = *bytes,
-            None => out[..2 * columns].copy_from_slice(&bytes[..2 * columns]),
-        }
-        return;
+fn write_narrow_row<K: Kernel>(k: K, row: &[i32; WINDOW], low: i32, columns: usize, out: &mut [u8]) {
+    let narrow = k.lower_halves(k.sub_i(eight(k, row, 0), k.splat_i(low))).map(u16::to_le);
+    let bytes: &[u8; 16] = bytemuck::cast_ref(&narrow);
+    match out.first_chunk_mut() {
+        Some(whole) => *whole = *bytes,
+        None => out[..2 * columns].copy_from_slice(&bytes[..2 * columns]), // fewer than eight
     }
-    for (x, place) in offsets[..columns].iter().zip(out.chunks_exact_mut(BYTES)) {
-        place.copy_from_slice(&x.to_le_bytes()[..BYTES]);
+    if columns > 8 {
+        out[16..18].copy_from_slice(&(row[8].wrapping_sub(low) as u16).to_le_bytes());
     }
 }
 

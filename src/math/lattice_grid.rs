@@ -80,7 +80,7 @@ impl LatticeGrid {
     }
 }
 
-/// How coordinates become whole numbers: to the nearest one of `x + shift`.
+/// How coordinates become whole numbers: to the nearest one of `x + shift`, the even one of two.
 #[derive(Clone, Copy, Debug)]
 pub struct Rounding {
     /// Added before.
@@ -144,11 +144,11 @@ impl Task for Round<'_> {
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) {
         let LatticeGrid { columns, rows, stride, axes } = self.grid;
-        let shift = k.splat4(self.rounding.shift + 0.5);
+        let shift = k.splat4(self.rounding.shift);
         for (axis, out) in axes.iter_mut().enumerate() {
             let out = &mut out[..*rows * *stride];
             for (out, x) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(self.points.axis(axis).as_chunks().0) {
-                *out = k.integers4(k.floor4(k.add4(k.load4(x), shift)));
+                *out = k.nearest4(k.add4(k.load4(x), shift));
             }
             for row in out.chunks_exact_mut(*stride) {
                 row[*columns] = row[*columns - 1];
@@ -173,7 +173,7 @@ mod tests {
             grid.round(&points, rounding);
             for k in 0..columns * 3 {
                 let (i, j) = (k % columns, k / columns);
-                assert_eq!(grid.point(i, j), point(k).map(|x| (x + 0.75).floor() as i32));
+                assert_eq!(grid.point(i, j), point(k).map(|x| (x + 0.25).round_ties_even() as i32));
                 assert_eq!(grid.window(0, j)[columns], grid.point(columns - 1, j)[0], "the last one is repeated");
             }
             assert_eq!(rounding.near(&points, [0, 1], 0, columns), (1 << columns) - 1, "y lies on a boundary");
@@ -189,7 +189,8 @@ mod tests {
         for k in 0..35 {
             points.set(k % 5, k / 5, [7.0, -3.1, if k % 3 == 0 { 0.25 - 1e-9 } else { 0.3 }]);
         }
-        let bits = |at: &dyn Fn(usize) -> usize, n: usize| (0..n).filter(|&k| at(k) % 3 == 0).fold(0, |m, k| m | 1 << k);
+        let bits =
+            |at: &dyn Fn(usize) -> usize, n: usize| (0..n).filter(|&k| at(k) % 3 == 0).fold(0, |m, k| m | 1 << k);
         assert_eq!(rounding.near(&points, [1, 2], 0, 4), bits(&|k| 11 + k, 4));
         assert_eq!(rounding.near(&points, [4, 1], 1, 6), bits(&|k| 9 + 5 * k, 6));
     }

@@ -37,6 +37,7 @@ macro_rules! in_registers {
 impl Kernel for Avx2 {
     type F = __m256;
     type D = __m256d;
+    type I = __m256i;
 
     #[inline(always)]
     fn splat(self, x: f32) -> __m256 {
@@ -167,10 +168,53 @@ impl Kernel for Avx2 {
         }
     }
     #[inline(always)]
-    fn integers4(self, x: __m256d) -> [i32; 4] {
+    fn nearest4(self, x: __m256d) -> [i32; 4] {
+        let mut out = [0; 4];
+        // SAFETY: `self` proves AVX2; `out` is 16 writable bytes and the store needs no alignment. Rounding is to nearest,
+        // since nobody changes the processor's mode.
+        unsafe { _mm_storeu_si128(out.as_mut_ptr().cast(), _mm256_cvtpd_epi32(x)) };
+        out
+    }
+    #[inline(always)]
+    fn splat_i(self, x: i32) -> __m256i {
+        in_registers!(_mm256_set1_epi32(x))
+    }
+    #[inline(always)]
+    fn load_i(self, x: &[i32; 8]) -> __m256i {
+        // SAFETY: `self` proves AVX2; `x` is 32 readable bytes and the load needs no alignment.
+        unsafe { _mm256_loadu_si256(x.as_ptr().cast()) }
+    }
+    #[inline(always)]
+    fn min_i(self, a: __m256i, b: __m256i) -> __m256i {
+        in_registers!(_mm256_min_epi32(a, b))
+    }
+    #[inline(always)]
+    fn max_i(self, a: __m256i, b: __m256i) -> __m256i {
+        in_registers!(_mm256_max_epi32(a, b))
+    }
+    #[inline(always)]
+    fn sub_i(self, a: __m256i, b: __m256i) -> __m256i {
+        in_registers!(_mm256_sub_epi32(a, b))
+    }
+    #[inline(always)]
+    fn even_lanes(self, x: __m256i) -> [i32; 4] {
         let mut out = [0; 4];
         // SAFETY: `self` proves AVX2; `out` is 16 writable bytes and the store needs no alignment.
-        unsafe { _mm_storeu_si128(out.as_mut_ptr().cast(), _mm256_cvttpd_epi32(x)) };
+        unsafe {
+            let first = _mm256_permutevar8x32_epi32(x, _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7));
+            _mm_storeu_si128(out.as_mut_ptr().cast(), _mm256_castsi256_si128(first));
+        }
+        out
+    }
+    #[inline(always)]
+    fn lower_halves(self, x: __m256i) -> [u16; 8] {
+        let mut out = [0; 8];
+        // SAFETY: `self` proves AVX2; `out` is 16 writable bytes and the store needs no alignment.
+        unsafe {
+            let lower = _mm256_and_si256(x, _mm256_set1_epi32(0xFFFF));
+            let packed = _mm_packus_epi32(_mm256_castsi256_si128(lower), _mm256_extracti128_si256::<1>(lower));
+            _mm_storeu_si128(out.as_mut_ptr().cast(), packed);
+        }
         out
     }
     #[inline(always)]

@@ -25,8 +25,10 @@ pub use portable::Portable;
 pub trait Kernel: Copy + Send + Sync + 'static {
     /// Eight floats.
     type F: Copy;
-    /// Four doubles: a point and a lane to spare.
+    /// Four doubles: a point and a lane to spare, or one coordinate of four points.
     type D: Copy;
+    /// Eight integers.
+    type I: Copy;
 
     /// `x` in every lane.
     fn splat(self, x: f32) -> Self::F;
@@ -82,10 +84,25 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     /// Lanes 0, 1 and 2 of four lists of whole numbers below 2^31 in magnitude: first all lanes 0, then all lanes 1, then all
     /// lanes 2.
     fn transposed_integers(self, x: [Self::D; 4]) -> [[i32; 4]; 3];
-    /// Whole numbers below 2^31 in magnitude as integers.
-    fn integers4(self, x: Self::D) -> [i32; 4];
+    /// The nearest integers, the even one of two; numbers are below 2^31 in magnitude.
+    fn nearest4(self, x: Self::D) -> [i32; 4];
     /// Lane i of list k becomes lane k of list i.
     fn transpose4(self, x: [Self::D; 4]) -> [Self::D; 4];
+
+    /// `x` in every lane.
+    fn splat_i(self, x: i32) -> Self::I;
+    /// The eight integers at `x`.
+    fn load_i(self, x: &[i32; 8]) -> Self::I;
+    /// Lanewise smaller one.
+    fn min_i(self, a: Self::I, b: Self::I) -> Self::I;
+    /// Lanewise greater one.
+    fn max_i(self, a: Self::I, b: Self::I) -> Self::I;
+    /// Lanewise difference, wrapping.
+    fn sub_i(self, a: Self::I, b: Self::I) -> Self::I;
+    /// Lanes 0, 2, 4 and 6.
+    fn even_lanes(self, x: Self::I) -> [i32; 4];
+    /// The lower halves of the lanes.
+    fn lower_halves(self, x: Self::I) -> [u16; 8];
 
     /// Two runs of four little-endian unsigned integers of `BYTES` bytes each (2, 3 or 4), at `at[0]` and `at[1]`; `base` is added to each
     /// (wrapping) and the sums are converted to floats.

@@ -27,6 +27,7 @@ fn mask(a: [f32; 8], b: [f32; 8], holds: impl Fn(f32, f32) -> bool) -> u32 {
 impl Kernel for Portable {
     type F = [f32; 8];
     type D = [f64; 4];
+    type I = [i32; 8];
 
     #[inline(always)]
     fn splat(self, x: f32) -> [f32; 8] {
@@ -133,8 +134,36 @@ impl Kernel for Portable {
         from_fn(|axis| from_fn(|i| x[i][axis] as i32))
     }
     #[inline(always)]
-    fn integers4(self, x: [f64; 4]) -> [i32; 4] {
-        x.map(|x| x as i32)
+    fn nearest4(self, x: [f64; 4]) -> [i32; 4] {
+        x.map(|x| x.round_ties_even() as i32)
+    }
+    #[inline(always)]
+    fn splat_i(self, x: i32) -> [i32; 8] {
+        [x; 8]
+    }
+    #[inline(always)]
+    fn load_i(self, x: &[i32; 8]) -> [i32; 8] {
+        *x
+    }
+    #[inline(always)]
+    fn min_i(self, a: [i32; 8], b: [i32; 8]) -> [i32; 8] {
+        from_fn(|k| a[k].min(b[k]))
+    }
+    #[inline(always)]
+    fn max_i(self, a: [i32; 8], b: [i32; 8]) -> [i32; 8] {
+        from_fn(|k| a[k].max(b[k]))
+    }
+    #[inline(always)]
+    fn sub_i(self, a: [i32; 8], b: [i32; 8]) -> [i32; 8] {
+        from_fn(|k| a[k].wrapping_sub(b[k]))
+    }
+    #[inline(always)]
+    fn even_lanes(self, x: [i32; 8]) -> [i32; 4] {
+        [x[0], x[2], x[4], x[6]]
+    }
+    #[inline(always)]
+    fn lower_halves(self, x: [i32; 8]) -> [u16; 8] {
+        x.map(|x| x as u16)
     }
     #[inline(always)]
     fn transpose4(self, x: [[f64; 4]; 4]) -> [[f64; 4]; 4] {

@@ -75,7 +75,9 @@ impl Task for RoundOfDoubles {
         let integers = k.transposed_integers([whole(0), whole(1), a_point(k, self.0), whole(2)]);
         let canonical = |x: f64| if x.is_nan() { f64::NAN.to_bits() } else { x.to_bits() };
         let doubles = doubles.into_iter().chain(k.transpose4([a, b, k.floor4(a), k.splat4(7.0)]));
-        let integers = integers.into_iter().chain([k.integers4(whole(3))]);
+        let integers = integers
+            .into_iter()
+            .chain([k.nearest4(whole(3)), k.nearest4(k.load4(&[0.5, 1.5, -2.5, 2.5 + f64::from(self.0)]))]);
         let lanes = doubles.flat_map(|d| k.store4(d).map(canonical));
         lanes.chain(integers.flatten().map(|i| i as u64)).chain([u64::from(k.lt4(a, b))]).collect()
     }
@@ -92,5 +94,33 @@ fn a_point<K: Kernel>(k: K, seed: u32) -> K::D {
 fn the_detected_kernel_gives_the_bits_of_the_portable_one_for_doubles() {
     for seed in 0..2000 {
         assert_eq!(run(RoundOfDoubles(seed)), RoundOfDoubles(seed).run(Portable), "seed {seed}");
+    }
+}
+
+/// As [`Round`], for integers.
+struct RoundOfIntegers(u32);
+
+impl Task for RoundOfIntegers {
+    type Output = Vec<i32>;
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> Vec<i32> {
+        let some = |seed: u32| -> [i32; 8] {
+            std::array::from_fn(|i| ((i as u32 + 1) * seed).wrapping_mul(0x9E37_79B9) as i32)
+        };
+        let (a, b) = (k.load_i(&some(self.0)), k.load_i(&some(self.0 + 7)));
+        let results = [k.min_i(a, b), k.max_i(a, b), k.sub_i(a, b), k.splat_i(self.0 as i32)];
+        let mut out = Vec::new();
+        for x in results {
+            out.extend(k.even_lanes(x));
+            out.extend(k.lower_halves(x).map(i32::from));
+        }
+        out
+    }
+}
+
+#[test]
+fn the_detected_kernel_gives_the_bits_of_the_portable_one_for_integers() {
+    for seed in 0..2000 {
+        assert_eq!(run(RoundOfIntegers(seed)), RoundOfIntegers(seed).run(Portable), "seed {seed}");
     }
 }

@@ -29,7 +29,8 @@ impl Evaluator {
             EditTree::Split(quarters) => {
                 let middle = self.middle(&target);
                 let wanted = quarters_of(&target, middle);
-                for (k, tree) in LEFT_FIRST.map(|k| (k, &quarters[k])).into_iter().filter(|(k, _)| wanted >> k & 1 == 1) {
+                for (k, tree) in LEFT_FIRST.map(|k| (k, &quarters[k])).into_iter().filter(|(k, _)| wanted >> k & 1 == 1)
+                {
                     let mark = self.n_params();
                     let part = self.quarter_target(&target, middle, k);
                     self.walk_tree(library, tree, depth + 1, part, out);

@@ -1,11 +1,11 @@
 //! Edited meshes whose refinement was compared with hbr: the diced surface against that refinement.
 
 use crate::ids::PatchId;
+use crate::math::PointGrid;
 use crate::mesh::{ControlMesh, EditKind, EditValue, shapes};
 use crate::subdiv::refine::tests::edits::{edit, edited_cube, edited_tetrahedron};
 use crate::subdiv::refine::{RefinedMesh, Tangents};
 use crate::subdiv::surface::PatchPoints;
-use crate::math::PointGrid;
 use crate::subdiv::{Evaluator, Surface};
 use glam::DVec3;
 
