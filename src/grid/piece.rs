@@ -211,7 +211,7 @@ fn write_narrow_row<K: Kernel>(k: K, row: &[i32; WINDOW], low: i32, columns: usi
     let bytes: &[u8; 16] = bytemuck::cast_ref(&narrow);
     match out.first_chunk_mut() {
         Some(whole) => *whole = *bytes,
-        None => out[..2 * columns].copy_from_slice(&bytes[..2 * columns]), // fewer than eight
+        None => out[..2 * columns].copy_from_slice(&bytes[..2 * columns]),
     }
     if columns > 8 {
         out[16..18].copy_from_slice(&(row[8].wrapping_sub(low) as u16).to_le_bytes());

@@ -1,6 +1,7 @@
 //! Conservative boxes of parts of patches, without evaluating them.
 
 use super::eval::{Evaluator, Point, quarter};
+use super::parts::Parts;
 use super::plan::{NodeId, Plan, PlanLibrary};
 use super::products::control_points;
 use super::regular::{self, BezierWeights, ControlPoints, bezier_weights};
@@ -35,7 +36,51 @@ impl HullWeights {
 impl Evaluator {
     /// A box that holds the part `[u0,u1] x [v0,v1]` of the patch: the Bézier hulls of its regular parts, and ring hulls
     /// `depth` splits below the patch, or where the surface is known to lie in them.
-    pub fn bounds(
+    pub(super) fn parts_bounds(
+        &mut self,
+        library: &PlanLibrary,
+        parts: &mut Parts,
+        u: [f64; 2],
+        v: [f64; 2],
+        depth: u32,
+    ) -> DBounds {
+        let mut bounds = DBounds::EMPTY;
+        self.bound_parts(library, parts, 0, u, v, depth, &mut bounds);
+        bounds
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn bound_parts(
+        &mut self,
+        library: &PlanLibrary,
+        parts: &mut Parts,
+        part: usize,
+        u: [f64; 2],
+        v: [f64; 2],
+        depth: u32,
+        bounds: &mut DBounds,
+    ) {
+        if let Some(control) = parts.control(part) {
+            return self.grow_by_hull(bounds, control, u, v);
+        }
+        let node = parts.node(part);
+        if depth == 0 && matches!(library.plan(node), Plan::Split { in_hull: true, .. }) {
+            return parts.points(part).iter().for_each(|p| bounds.grow(p.to_vec()));
+        }
+        let Some(first) = parts.quarters(library, part) else {
+            let ring = self.start_ring(parts.points(part));
+            return self.bound(library, node, ring, u, v, depth, bounds);
+        };
+        for k in 0..4 {
+            let (x, y) = quarter(k);
+            if let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) {
+                self.bound_parts(library, parts, first + k, u, v, depth.saturating_sub(1), bounds);
+            }
+        }
+    }
+
+    /// As [`parts_bounds`](Self::parts_bounds) of a ring, of which nothing is kept.
+    pub(super) fn bounds(
         &mut self,
         library: &PlanLibrary,
         node: NodeId,

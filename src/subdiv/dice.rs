@@ -203,7 +203,7 @@ impl Dicer {
         let (n_u, n_v) = (f64::from(rates.n_u), f64::from(rates.n_v));
         let us = (i0..=i1).map(|i| f64::from(i) / n_u);
         let vs = (j0..=j1).map(|j| f64::from(j) / n_v);
-        surface.grid(&self.points[lane], &mut self.evaluator, us, vs, &mut self.out);
+        surface.grid(&mut self.points[lane], &mut self.evaluator, us, vs, &mut self.out);
         out.round(&self.out, ROUNDING);
         for side in [0, 2, 3, 1] {
             self.settle_side(surface, patch, rates, side, [[i0, i1], [j0, j1]], out);
@@ -281,7 +281,7 @@ impl Dicer {
 
     fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> [f64; 3] {
         let lane = self.load(surface, patch);
-        surface.grid(&self.points[lane], &mut self.evaluator, [u], [v], &mut self.single);
+        surface.grid(&mut self.points[lane], &mut self.evaluator, [u], [v], &mut self.single);
         self.single.point(0, 0)
     }
 
@@ -309,7 +309,7 @@ impl Dicer {
         depth: u32,
     ) -> Bounds {
         let lane = self.load(surface, patch);
-        let points = &self.points[lane];
+        let points = &mut self.points[lane];
         let range = |[a, b]: [u32; 2], n: u32| [f64::from(a) / f64::from(n), f64::from(b) / f64::from(n)];
         let (u, v) = (range(i, rates.n_u), range(j, rates.n_v));
         let mut bounds = surface.bounds(points, &mut self.evaluator, u, v, depth);
@@ -339,7 +339,7 @@ impl Dicer {
     /// As [`bounds`](Self::bounds) for a whole patch at any rates.
     pub fn patch_bounds(&mut self, surface: &Surface, patch: PatchId, depth: u32) -> Bounds {
         let lane = self.load(surface, patch);
-        let b = surface.bounds(&self.points[lane], &mut self.evaluator, [0.0, 1.0], [0.0, 1.0], depth);
+        let b = surface.bounds(&mut self.points[lane], &mut self.evaluator, [0.0, 1.0], [0.0, 1.0], depth);
         to_lattice_box(b.min, b.max)
     }
 }
@@ -420,7 +420,7 @@ impl OwnerScratch {
 
     fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> [i32; 3] {
         surface.load(patch, &mut self.points);
-        surface.grid(&self.points, &mut self.evaluator, [u], [v], &mut self.single);
+        surface.grid(&mut self.points, &mut self.evaluator, [u], [v], &mut self.single);
         round_point(self.single.point(0, 0)).0
     }
 }

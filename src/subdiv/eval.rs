@@ -1,6 +1,7 @@
 //! Walking down plans: grids of points, and single samples with tangents.
 
 use super::bounds::HullWeights;
+use super::parts::Parts;
 use super::plan::{Child, Children, Limit, Limits, NodeId, Plan, PlanLibrary};
 use super::products::{child_points, control_points, one_product, products};
 use super::regular::{self, Basis, ControlPoints};
@@ -120,6 +121,13 @@ pub(super) struct Target {
     first: [usize; 2],
 }
 
+impl Target {
+    /// Whether there is one point only.
+    fn is_single(&self) -> bool {
+        self.us.1 - self.us.0 == 1 && self.vs.1 - self.vs.0 == 1
+    }
+}
+
 /// Where a polygon's child or a quad's quarter lies: its corner in units of its size.
 pub(super) fn quarter(k: usize) -> (f64, f64) {
     [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][k]
@@ -140,20 +148,49 @@ fn exact_corner(u: f64, v: f64) -> Option<usize> {
 }
 
 impl Evaluator {
-    /// Positions at all pairs of `us` and `vs` (each ascending, in 0..=1) of the patch that starts at `node` with ring
-    /// points `ring`; point (i, j) of `out` is at `(us[i], vs[j])`.
-    pub fn grid(
+    /// Positions at all pairs of `us` and `vs` (each ascending, in 0..=1) of an irregular patch; point (i, j) of `out` is at `(us[i], vs[j])`.
+    pub(super) fn grid(
         &mut self,
         library: &PlanLibrary,
-        node: NodeId,
-        ring: &[Point],
+        parts: &mut Parts,
         us: impl IntoIterator<Item = f64>,
         vs: impl IntoIterator<Item = f64>,
         out: &mut PointGrid,
     ) {
-        let ring = self.start_ring(ring);
         let target = self.start_grid(us, vs, out);
-        self.walk(library, node, ring, 0, target, out);
+        self.walk_parts(library, parts, 0, 0, target, out);
+    }
+
+    /// As [`walk`](Self::walk) for a part of a patch, whose parts are kept.
+    fn walk_parts(
+        &mut self,
+        library: &PlanLibrary,
+        parts: &mut Parts,
+        part: usize,
+        depth: u32,
+        target: Target,
+        out: &mut PointGrid,
+    ) {
+        if let Some(control) = parts.control(part) {
+            return self.regular(control, target, out);
+        }
+        let node = parts.node(part);
+        let quarters = if target.is_single() { None } else { parts.quarters(library, part) };
+        let Some(first) = quarters else {
+            let ring = self.start_ring(parts.points(part));
+            return self.walk(library, node, ring, depth, target, out);
+        };
+        let middle = self.middle(&target);
+        let wanted = quarters_of(&target, middle);
+        let mark = self.params.len();
+        for k in LEFT_FIRST.into_iter().filter(|k| wanted >> k & 1 == 1) {
+            let target = self.quarter_target(&target, middle, k);
+            self.walk_parts(library, parts, first + k, depth + 1, target, out);
+            self.params.truncate(mark);
+        }
+        if let Plan::Split { limits, .. } = library.plan(node) {
+            self.set_corners(library, limits, parts.points(part), &target, out);
+        }
     }
 
     /// Forgets other points; returns where the ring starts.
@@ -207,8 +244,7 @@ impl Evaluator {
             }
             Plan::Split { rows, children, limits, .. } => (rows, children, limits),
         };
-        let single = target.us.1 - target.us.0 == 1 && target.vs.1 - target.vs.0 == 1;
-        if single || depth >= MAX_DEPTH {
+        if target.is_single() || depth >= MAX_DEPTH {
             let (u, v) = (self.params[target.us.0], self.params[target.vs.0]);
             let corner = if depth >= MAX_DEPTH { exact_corner(u.round(), v.round()) } else { exact_corner(u, v) };
             if let Some(row) = corner.and_then(|k| limits.get(k)?.position()) {
@@ -234,7 +270,7 @@ impl Evaluator {
             self.params.truncate(marks.1);
         }
         self.points.truncate(start);
-        self.set_corners(library, limits, ring, &target, out);
+        self.set_corners(library, limits, &self.points[ring..], &target, out);
     }
 
     /// Corners whose limit is known here, in place of what deeper parts made of them: a point alone comes no further than
@@ -243,7 +279,7 @@ impl Evaluator {
         &self,
         library: &PlanLibrary,
         limits: Limits<'_>,
-        ring: usize,
+        ring: &[Point],
         target: &Target,
         out: &mut PointGrid,
     ) {
@@ -254,7 +290,7 @@ impl Evaluator {
             let (i, j) = (if x == 0.0 { 0 } else { n_u - 1 }, if y == 0.0 { 0 } else { n_v - 1 });
             let is_wanted = self.params[target.us.0 + i] == x && self.params[target.vs.0 + j] == y;
             if let (true, Some(row)) = (is_wanted, limit.position()) {
-                let p = one_product(library.rows(), row, 0, &self.points[ring..]);
+                let p = one_product(library.rows(), row, 0, ring);
                 out.set(target.first[0] + i, target.first[1] + j, p.to_vec().to_array());
             }
         }

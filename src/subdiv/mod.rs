@@ -29,6 +29,7 @@ pub mod dice;
 pub mod edits;
 pub mod eval;
 pub mod local;
+mod parts;
 pub mod plan;
 mod products;
 pub mod refine;

@@ -3,6 +3,7 @@
 use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, sample_regular};
 use super::local::RingWalker;
+use super::parts::Parts;
 use super::plan::{NodeId, PlanLibrary};
 use super::regular::ControlPoints;
 use super::rules::RuleSet;
@@ -83,7 +84,7 @@ pub struct PatchPoints {
     of: Option<(u64, PatchId)>,
     node: NodeId,
     control: ControlPoints,
-    ring: Vec<Point>,
+    parts: Parts,
     /// The last polygon, and the points of its ring and refinement.
     polygon_face: Option<(u64, FaceId)>,
     polygon: Vec<Point>,
@@ -96,7 +97,7 @@ impl Default for PatchPoints {
             of: None,
             node: REGULAR,
             control: [Point::ZERO; 16],
-            ring: Vec::new(),
+            parts: Parts::default(),
             polygon_face: None,
             polygon: Vec::new(),
             walker: RingWalker::default(),
@@ -258,15 +259,16 @@ impl Surface {
         if points.node == EDITED {
             return;
         }
-        points.ring.clear();
         if size == 4 {
             let sources = points.walker.sources(&self.topology, first + points.node.turn());
-            points.ring.extend(sources.iter().map(|&v| self.control_point(v)));
+            points.parts.new_ring().extend(sources.iter().map(|&v| self.control_point(v)));
         } else {
             self.load_polygon(face, points);
             let parent = &points.polygon;
-            points.node = Evaluator::child_ring(&self.plans, points.node, parent, sub as usize, &mut points.ring);
+            let ring = points.parts.new_ring();
+            points.node = Evaluator::child_ring(&self.plans, points.node, parent, sub as usize, ring);
         }
+        points.parts.begin(&self.plans, points.node);
     }
 
     /// Refines a polygon, unless it is the last one: its patches, which it may have many of, are often loaded in a row.
@@ -288,10 +290,10 @@ impl Surface {
         Some(self.edited.tree(patch))
     }
 
-    /// Positions on a tensor grid of parameters, in lattice units; see [`Evaluator::grid`].
+    /// Positions on a tensor grid of parameters, in lattice units; see `Evaluator::grid`.
     pub fn grid(
         &self,
-        points: &PatchPoints,
+        points: &mut PatchPoints,
         evaluator: &mut Evaluator,
         us: impl IntoIterator<Item = f64>,
         vs: impl IntoIterator<Item = f64>,
@@ -302,7 +304,7 @@ impl Surface {
         } else if let Some(tree) = self.tree(points) {
             evaluator.edited_grid(&self.plans, tree, us, vs, out);
         } else {
-            evaluator.grid(&self.plans, points.node, &points.ring, us, vs, out);
+            evaluator.grid(&self.plans, &mut points.parts, us, vs, out);
         }
     }
 
@@ -313,7 +315,7 @@ impl Surface {
         } else if let Some(tree) = self.tree(points) {
             evaluator.edited_sample(&self.plans, tree, u, v)
         } else {
-            evaluator.sample(&self.plans, points.node, &points.ring, u, v)
+            evaluator.sample(&self.plans, points.node, points.parts.ring(&self.plans), u, v)
         }
     }
 
@@ -323,10 +325,10 @@ impl Surface {
         if sample.kind == SampleKind::PositionOnly { DVec3::ZERO } else { sample.du.cross(sample.dv) }
     }
 
-    /// A box in lattice units that holds part of a patch; see [`Evaluator::bounds`].
+    /// A box in lattice units that holds part of a patch; see `Evaluator::parts_bounds`.
     pub fn bounds(
         &self,
-        points: &PatchPoints,
+        points: &mut PatchPoints,
         evaluator: &mut Evaluator,
         u: [f64; 2],
         v: [f64; 2],
@@ -339,7 +341,7 @@ impl Surface {
         } else if let Some(tree) = self.tree(points) {
             evaluator.edited_bounds(&self.plans, tree, u, v, depth)
         } else {
-            evaluator.bounds(&self.plans, points.node, &points.ring, u, v, depth)
+            evaluator.parts_bounds(&self.plans, &mut points.parts, u, v, depth)
         }
     }
 }

@@ -1,0 +1,117 @@
+//! What is known of an irregular patch: the parts its plan has split it into so far, with their points.
+//!
+//! The boxes of a patch's node and each of its pieces walk down the same plan towards the same corner. So what one of them
+//! has found stays as long as the patch is remembered, and the next one starts from there.
+
+use super::eval::Point;
+use super::plan::{NodeId, Plan, PlanLibrary};
+use super::products::{control_points, products};
+use super::regular::ControlPoints;
+
+/// Parts that are kept. A corner needs four a level, a crease four times as many on each level; what is beyond is found
+/// again each time.
+const MOST_PARTS: usize = 64;
+
+/// The quadtree of a patch, as far as it has been asked for. Part 0 is the patch.
+#[derive(Debug, Default)]
+pub(super) struct Parts {
+    /// The ring of the patch, then points of parts.
+    points: Vec<Point>,
+    parts: Vec<Part>,
+    /// Refined points of the part that is split, and then the ring of a quarter that is regular.
+    scratch: Vec<Point>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    node: NodeId,
+    /// Its points: control points if it is regular, else its ring.
+    first: u32,
+    n_points: u32,
+    is_regular: bool,
+    /// The first of its four quarters, or 0.
+    quarters: u32,
+}
+
+impl Parts {
+    /// Forgets everything; what is put here is the ring of the patch that [`begin`](Self::begin) tells of.
+    pub fn new_ring(&mut self) -> &mut Vec<Point> {
+        self.parts.clear();
+        self.points.clear();
+        &mut self.points
+    }
+
+    /// The patch of the ring starts at `node`.
+    pub fn begin(&mut self, library: &PlanLibrary, node: NodeId) {
+        let part = Part { node, first: 0, n_points: self.points.len() as u32, is_regular: false, quarters: 0 };
+        self.parts.push(match library.plan(node) {
+            Plan::Regular(rows, turn) => {
+                let control = control_points(library.rows(), rows, turn, &self.points);
+                self.points.extend(control);
+                Part { first: part.n_points, n_points: 16, is_regular: true, ..part }
+            }
+            Plan::Split { .. } => part,
+        });
+    }
+
+    /// The ring of the patch.
+    pub fn ring(&self, library: &PlanLibrary) -> &[Point] {
+        &self.points[..library.n_points(self.parts[0].node)]
+    }
+
+    /// The node of a part.
+    pub fn node(&self, part: usize) -> NodeId {
+        self.parts[part].node
+    }
+
+    /// The control points of a part, if it is regular.
+    pub fn control(&self, part: usize) -> Option<&ControlPoints> {
+        self.parts[part].is_regular.then(|| self.points(part).as_array().expect("16 points"))
+    }
+
+    /// The ring of a part, or its control points.
+    pub fn points(&self, part: usize) -> &[Point] {
+        let Part { first, n_points, .. } = self.parts[part];
+        &self.points[first as usize..][..n_points as usize]
+    }
+
+    /// The first of an irregular part's four quarters, which follow each other; `None` if there are too many parts.
+    pub fn quarters(&mut self, library: &PlanLibrary, part: usize) -> Option<usize> {
+        let known = self.parts[part].quarters as usize;
+        if known == 0 && self.parts.len() + 4 <= MOST_PARTS {
+            Some(self.split(library, part))
+        } else {
+            (known != 0).then_some(known)
+        }
+    }
+
+    fn split(&mut self, library: &PlanLibrary, part: usize) -> usize {
+        let Plan::Split { rows, children, .. } = library.plan(self.parts[part].node) else {
+            unreachable!("a regular part is not split")
+        };
+        let store = library.rows();
+        self.scratch.resize(rows.len(), Point::ZERO);
+        let Part { first, n_points, .. } = self.parts[part];
+        products(store, rows, &self.points[first as usize..][..n_points as usize], &mut self.scratch);
+        let quarters = self.parts.len();
+        self.parts[part].quarters = quarters as u32;
+        for child in (0..4).map(|k| children.get(k)) {
+            let first = self.points.len();
+            let plan = library.plan(child.node);
+            if let Plan::Regular(rows_of_child, turn) = plan {
+                let n = rows.len();
+                self.scratch.resize(n + child.points.len(), Point::ZERO);
+                let (refined, ring) = self.scratch.split_at_mut(n);
+                store.gather(child.points, refined, ring);
+                self.points.extend(control_points(store, rows_of_child, turn, ring));
+            } else {
+                self.points.resize(first + child.points.len(), Point::ZERO);
+                store.gather(child.points, &self.scratch, &mut self.points[first..]);
+            }
+            let n_points = (self.points.len() - first) as u32;
+            let is_regular = matches!(plan, Plan::Regular(..));
+            self.parts.push(Part { node: child.node, first: first as u32, n_points, is_regular, quarters: 0 });
+        }
+        quarters
+    }
+}
