@@ -109,7 +109,7 @@ fn cheapest(items: &[Item]) -> (f32, usize) {
     let mut best = (f32::INFINITY, LANES);
     for middle in 1..n {
         bounds = bounds.union(items[middle - 1].bounds);
-        if middle % LANES == 0 || (n - middle) % LANES == 0 {
+        if middle.is_multiple_of(LANES) || (n - middle).is_multiple_of(LANES) {
             let n_nodes = |n: usize| n.div_ceil(LANES) as f32;
             let cost = half_area(&bounds) * n_nodes(middle) + above[middle] * n_nodes(n - middle);
             if cost < best.0 {
