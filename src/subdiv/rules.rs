@@ -575,7 +575,8 @@ fn refined_tags(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> VertexTags
     }
 }
 
-/// The row of a refined vertex, see [`add_face_point`] for its columns; vertices must be corners of the target.
+/// The row of a refined vertex; vertices must be corners of the target. The column after the ring's points is the face point of
+/// a target that is a polygon.
 pub fn refined_row(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> Row {
     match origin {
         Origin::Vertex(h) => vertex_point(rules, mesh, h),
