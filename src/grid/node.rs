@@ -3,7 +3,7 @@
 use super::boxes::{CellRect, HEAD_BYTES, Head, IntegerBox, LaneBoxes, LaneHits, lane_mask, union};
 use super::{LATTICE_LIMIT, LatticeRay};
 use crate::math::Bounds;
-use crate::math::simd::Kernel;
+use crate::math::simd::{self, Kernel, Task};
 use glam::Vec3;
 
 /// Exact size of a node, without the words that the cache puts before it.
@@ -17,6 +17,27 @@ const NO_FORMAT: u8 = 0;
 /// empty. `out` is [`NODE_BYTES`] long.
 #[inline]
 pub fn encode_node(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &mut [u8]) {
+    simd::run(EncodeNode { cells, children, bounds, out });
+}
+
+struct EncodeNode<'a> {
+    cells: CellRect,
+    children: [u8; 2],
+    bounds: &'a [Bounds],
+    out: &'a mut [u8],
+}
+
+impl Task for EncodeNode<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(self, _: K) {
+        let Self { cells, children, bounds, out } = self;
+        encode(cells, children, bounds, out);
+    }
+}
+
+#[inline(always)]
+fn encode(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &mut [u8]) {
     debug_assert!(children.iter().all(|n| (1..=4).contains(n)));
     let [n_u, n_v] = children.map(usize::from);
     assert_eq!(bounds.len(), n_u * n_v, "one box for each child");

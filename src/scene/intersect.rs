@@ -25,6 +25,9 @@ const NODE_SIDE: u32 = 4;
 /// Quarters towards an irregular corner that a node's child boxes look into, below the child's own size.
 const CHILD_BOX_DEPTH: u32 = 3;
 
+/// Patches whose rates a builder remembers.
+const N_RATES: usize = 16;
+
 /// One thread's access to the scene's geometry.
 pub struct Intersector<'w> {
     world: &'w World,
@@ -47,6 +50,8 @@ struct Builder<'w> {
     n_pieces: u64,
     n_triangles: u64,
     costs: BuildCosts,
+    /// Rates of the last patches, one for each remainder of patch numbers.
+    rates: [Option<(MeshId, PatchId, PatchRates)>; N_RATES],
     /// Notes every block that is asked for, if the cache wants to know.
     recorder: Option<Recorder<'w>>,
 }
@@ -103,7 +108,7 @@ impl Builder<'_> {
         };
         self.n_built += 1;
         self.costs.add(of.id, of.patch, 1);
-        let rates = of.mesh.patch_rates(of.patch);
+        let rates = self.rates(of);
         let cells = cells.unwrap_or(CellRect { i0: 0, j0: 0, i1: rates.n_u as u16, j1: rates.n_v as u16 });
         let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
         if cells.size().iter().all(|&n| n <= MAX_CELLS) {
@@ -121,6 +126,15 @@ impl Builder<'_> {
         ticket.publish(BlockLayout { bytes: NODE_BYTES, children: n_slots }, |out| {
             encode_node(cells, children, boxes, out);
         })
+    }
+
+    /// How finely a patch is diced: the same for its node and all its pieces.
+    fn rates(&mut self, of: PatchContext<'_>) -> PatchRates {
+        let remembered = &mut self.rates[of.patch.idx() % N_RATES];
+        match remembered {
+            Some((mesh, patch, rates)) if (*mesh, *patch) == (of.id, of.patch) => *rates,
+            _ => remembered.insert((of.id, of.patch, of.mesh.patch_rates(of.patch))).2,
+        }
     }
 
     /// Puts the boxes of a node's children into `self.boxes`; returns their number along u and v.

@@ -8,28 +8,35 @@ use super::regular::{self, BezierWeights, ControlPoints, bezier_weights};
 use crate::math::DBounds;
 use crate::math::simd;
 
-/// Weights of the last ranges along u and v: neighbouring parts of a patch have one of them in common.
+/// Weights of the last ranges along u and along v.
+pub(super) type HullWeights = [RangeWeights; 2];
+
+/// Ranges that are remembered, by their ends in quarters: the whole, its halves and its quarters have places of their own,
+/// but for one.
+const N_RANGES: usize = 8;
+
+/// Weights of the last parameter ranges: the parts of a patch have ranges in common, and most patches the same ones.
 #[derive(Debug)]
-pub(super) struct HullWeights {
-    ranges: [[f64; 2]; 2],
-    weights: [BezierWeights; 2],
+pub(super) struct RangeWeights {
+    ranges: [[f64; 2]; N_RANGES],
+    weights: [BezierWeights; N_RANGES],
 }
 
-impl Default for HullWeights {
+impl Default for RangeWeights {
     fn default() -> Self {
-        Self { ranges: [[0.0, 1.0]; 2], weights: [bezier_weights([0.0, 1.0]); 2] }
+        Self { ranges: [[0.0, 1.0]; N_RANGES], weights: [bezier_weights([0.0, 1.0]); N_RANGES] }
     }
 }
 
-impl HullWeights {
-    fn get(&mut self, u: [f64; 2], v: [f64; 2]) -> [&BezierWeights; 2] {
-        for (k, range) in [u, v].into_iter().enumerate() {
-            if self.ranges[k] != range {
-                self.ranges[k] = range;
-                self.weights[k] = bezier_weights(range);
-            }
+impl RangeWeights {
+    #[inline(always)]
+    fn get(&mut self, range: [f64; 2]) -> &BezierWeights {
+        let place = ((4.0 * range[0]) as usize ^ (4.0 * range[1]) as usize) % N_RANGES;
+        if self.ranges[place] != range {
+            self.ranges[place] = range;
+            self.weights[place] = bezier_weights(range);
         }
-        [&self.weights[0], &self.weights[1]]
+        &self.weights[place]
     }
 }
 
@@ -139,8 +146,8 @@ impl Evaluator {
 
     /// Enlarges `bounds` by the Bézier hull of a part of a regular patch.
     pub fn grow_by_hull(&mut self, bounds: &mut DBounds, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) {
-        let [u, v] = self.hulls.get(u, v);
-        for p in simd::run(regular::Hull { control, u, v }) {
+        let [of_u, of_v] = &mut self.hulls;
+        for p in simd::run(regular::Hull { control, u: of_u.get(u), v: of_v.get(v) }) {
             bounds.grow(p.to_vec());
         }
     }

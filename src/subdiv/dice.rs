@@ -14,6 +14,7 @@ use super::eval::{Evaluator, SurfaceSample};
 use super::surface::{PatchPoints, Surface};
 use crate::ids::{FaceId, PatchId};
 use crate::math::lattice_grid::MOST_NEAR;
+use crate::math::simd::{self, Kernel, Task};
 use crate::math::{Bounds, LatticeGrid, PointGrid, Rounding};
 use crate::topology::HalfEdges;
 use glam::{DVec3, Vec3};
@@ -347,9 +348,28 @@ impl Dicer {
 /// Rounds outwards to lattice points, by what rounding a vertex can move it and a little for evaluation errors. The
 /// result is exact in f32, since lattice coordinates stay below 2^24.
 fn to_lattice_box(min: DVec3, max: DVec3) -> Bounds {
-    let down = |x: f64| (x + LATTICE_SHIFT - 0.51).floor() as f32;
-    let up = |x: f64| (x + LATTICE_SHIFT + 0.51).ceil() as f32;
-    Bounds { min: Vec3::new(down(min.x), down(min.y), down(min.z)), max: Vec3::new(up(max.x), up(max.y), up(max.z)) }
+    simd::run(LatticeBox { min, max })
+}
+
+struct LatticeBox {
+    min: DVec3,
+    max: DVec3,
+}
+
+impl Task for LatticeBox {
+    type Output = Bounds;
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> Bounds {
+        let Self { min, max } = self;
+        let low = k.add4(k.load4(&[min.x, min.y, min.z, 0.0]), k.splat4(LATTICE_SHIFT - 0.51));
+        // What is to be rounded up is rounded down beyond zero.
+        let high = k.sub4(k.load4(&[-max.x, -max.y, -max.z, 0.0]), k.splat4(LATTICE_SHIFT + 0.51));
+        let (low, high) = (k.store4(k.floor4(low)), k.store4(k.floor4(high)));
+        Bounds {
+            min: Vec3::new(low[0] as f32, low[1] as f32, low[2] as f32),
+            max: Vec3::new(-high[0] as f32, -high[1] as f32, -high[2] as f32),
+        }
+    }
 }
 
 impl OwnerScratch {
