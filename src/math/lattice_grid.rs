@@ -187,10 +187,11 @@ mod tests {
         let mut points = PointGrid::default();
         points.reset(5, 7);
         for k in 0..35 {
-            points.set(k % 5, k / 5, [7.0, -3.1, if k % 3 == 0 { 0.25 - 1e-9 } else { 0.3 }]);
+            points.set(k % 5, k / 5, [7.0, -3.1, if k.is_multiple_of(3) { 0.25 - 1e-9 } else { 0.3 }]);
         }
-        let bits =
-            |at: &dyn Fn(usize) -> usize, n: usize| (0..n).filter(|&k| at(k) % 3 == 0).fold(0, |m, k| m | 1 << k);
+        let bits = |at: &dyn Fn(usize) -> usize, n: usize| {
+            (0..n).filter(|&k| at(k).is_multiple_of(3)).fold(0, |m, k| m | 1 << k)
+        };
         assert_eq!(rounding.near(&points, [1, 2], 0, 4), bits(&|k| 11 + k, 4));
         assert_eq!(rounding.near(&points, [4, 1], 1, 6), bits(&|k| 9 + 5 * k, 6));
     }
