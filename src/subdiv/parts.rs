@@ -5,7 +5,7 @@
 
 use super::eval::Point;
 use super::plan::{NodeId, Plan, PlanLibrary};
-use super::products::products;
+use super::products::{control_points, products};
 use super::regular::ControlPoints;
 
 /// Parts that are kept. A corner needs four a level, a crease four times as many on each level; what is beyond is found
