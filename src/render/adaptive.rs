@@ -126,9 +126,14 @@ impl<T: Tracer> Worker<'_, '_, T> {
             let watch = Instant::now();
             self.footprints.find([tile.x0, tile.y0]);
             self.outcome.seconds.prepare += watch.elapsed().as_secs_f64();
-            self.render(tile, visible, &mut records);
-            records.iter().for_each(|record| self.outcome.pixels.add(record.reason, 1));
-            film.lock().store(visible, &records);
+            if self.footprints.is_bare() {
+                self.outcome.pixels.add(Reason::Background, visible.n_pixels() as u64);
+                film.lock().fill(visible, &self.job.background());
+            } else {
+                self.render(tile, visible, &mut records);
+                records.iter().for_each(|record| self.outcome.pixels.add(record.reason, 1));
+                film.lock().store(visible, &records);
+            }
             queue.report(tile.n_pixels());
         }
         self.outcome.rays = self.shader.rays();
@@ -139,10 +144,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
     fn render(&mut self, tile: PixelRect, visible: PixelRect, records: &mut Vec<PixelRecord>) {
         let watch = Instant::now();
         records.clear();
-        records.resize(visible.n_pixels(), PixelRecord::background(self.job.appearance.background.to_array()));
-        if self.footprints.is_bare() {
-            return;
-        }
+        records.resize(visible.n_pixels(), self.job.background());
         self.tile.reset([tile.x0, tile.y0]);
         if self.job.is_possible() && !self.footprints.is_crowded() {
             (0..CELL_SIDES.len()).for_each(|level| self.refine(level));
@@ -152,10 +154,17 @@ impl<T: Tracer> Worker<'_, '_, T> {
         if self.is_sampled_by_need() {
             self.look_everywhere(tile);
         }
-        for k in 0..TILE_SIDE.pow(2) {
-            let pixel = [tile.x0 + even_bits(k), tile.y0 + even_bits(k >> 1)];
-            if let Some(idx) = visible.idx(pixel) {
-                records[idx] = self.traced(pixel);
+        let along_curve = |k: u32| [tile.x0 + even_bits(k), tile.y0 + even_bits(k >> 1)];
+        let per_cell = CELL_SIDES[0].pow(2);
+        for first in (0..TILE_SIDE.pow(2)).step_by(per_cell as usize) {
+            let largest = self.tile.place(0, along_curve(first));
+            if matches!(self.tile.cell(&largest), Cell::Empty | Cell::Undivided) {
+                continue;
+            }
+            for pixel in (first..first + per_cell).map(along_curve) {
+                if let Some(idx) = visible.idx(pixel) {
+                    records[idx] = self.traced(pixel);
+                }
             }
         }
         let traced = watch.elapsed().as_secs_f64();
@@ -214,7 +223,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
     /// The pixel, unless it is to be interpolated: then a mere note of that.
     fn traced(&mut self, pixel: [u32; 2]) -> PixelRecord {
         let interpolation = self.job;
-        let background = PixelRecord::background(interpolation.appearance.background.to_array());
+        let background = interpolation.background();
         let (place, cell) = self.tile.find(pixel);
         match cell {
             Cell::Undivided | Cell::Empty => background,
@@ -294,12 +303,13 @@ impl<T> Worker<'_, '_, T> {
         if let Some(reason) = first_difference(&smooths) {
             return Cell::Split(reason);
         }
-        if !self.is_connected(place, &probes, &smooths) {
-            return Cell::Split(Reason::Hidden);
-        }
         let error = self.job.prediction_error(place, &probes, &smooths);
-        let holds = error <= self.job.settings.tolerance;
-        if holds { Cell::Holds { error } } else { Cell::Split(Reason::Contradiction) }
+        // Footprints last: they take longest.
+        match error <= self.job.settings.tolerance {
+            false => Cell::Split(Reason::Contradiction),
+            true if self.is_connected(place, &probes, &smooths) => Cell::Holds { error },
+            true => Cell::Split(Reason::Hidden),
+        }
     }
 
     fn is_connected<const N: usize>(&mut self, place: &CellPlace, probes: &[Probe; N], smooths: &[Smooth; N]) -> bool {
@@ -356,6 +366,10 @@ struct Interpolation<'a> {
 impl<'a> Interpolation<'a> {
     fn is_possible(&self) -> bool {
         self.settings.integrator == IntegratorKind::Whitted && self.appearance.lights.len() <= LightMasks::CAPACITY
+    }
+
+    fn background(&self) -> PixelRecord {
+        PixelRecord::background(self.appearance.background.to_array())
     }
 
     fn pixels(&self) -> PixelTracer<'a> {

@@ -18,6 +18,9 @@ pub(super) const CELL_SIDES: [u32; 3] = [16, 8, 4];
 /// Probes along a side of a tile.
 const PROBES: u32 = TILE_SIDE + 1;
 
+/// The place of a probe that was not traced.
+const UNTRACED: u16 = u16::MAX;
+
 /// What has become of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Cell {
@@ -44,7 +47,10 @@ pub(super) struct Tile {
     origin: [u32; 2],
     /// Of the whole picture.
     size: [u32; 2],
-    probes: Vec<Option<TracedProbe>>,
+    /// Where in `traced` the probe of each pixel is, or [`UNTRACED`].
+    places: Vec<u16>,
+    /// Probes in the order they were traced in.
+    traced: Vec<TracedProbe>,
     cells: [Vec<Cell>; CELL_SIDES.len()],
 }
 
@@ -71,24 +77,26 @@ impl CellPlace {
 
 impl Tile {
     /// Bytes of a tile.
-    pub const BYTES: usize = PROBES.pow(2) as usize * size_of::<Option<TracedProbe>>();
+    pub const BYTES: usize = PROBES.pow(2) as usize * (size_of::<u16>() + size_of::<TracedProbe>());
 
     /// A tile of a picture of `size` pixels.
     pub fn new(size: [u32; 2]) -> Self {
         let cells = CELL_SIDES.map(|side| vec![Cell::Undivided; (TILE_SIDE / side).pow(2) as usize]);
-        Self { origin: [0; 2], size, probes: vec![None; PROBES.pow(2) as usize], cells }
+        let n = PROBES.pow(2) as usize;
+        Self { origin: [0; 2], size, places: vec![UNTRACED; n], traced: Vec::with_capacity(n), cells }
     }
 
     /// Begins another tile.
     pub fn reset(&mut self, origin: [u32; 2]) {
         self.origin = origin;
-        self.probes.fill(None);
+        self.places.fill(UNTRACED);
+        self.traced.clear();
         self.cells.iter_mut().for_each(|cells| cells.fill(Cell::Undivided));
     }
 
     /// The probe at a pixel of the tile or right beside or below it.
     pub fn probe(&self, pixel: [u32; 2]) -> Option<&TracedProbe> {
-        self.probes[self.probe_idx(pixel)].as_ref()
+        self.traced.get(usize::from(self.places[self.probe_idx(pixel)]))
     }
 
     /// Whether a pixel is one of the tile's.
@@ -98,7 +106,9 @@ impl Tile {
 
     pub fn set_probe(&mut self, pixel: [u32; 2], probe: TracedProbe) {
         let idx = self.probe_idx(pixel);
-        self.probes[idx] = Some(probe);
+        debug_assert_eq!(self.places[idx], UNTRACED);
+        self.places[idx] = self.traced.len() as u16;
+        self.traced.push(probe);
     }
 
     fn probe_idx(&self, [x, y]: [u32; 2]) -> usize {

@@ -256,6 +256,19 @@ impl Film {
         }
     }
 
+    /// Exposes every pixel of a part of the window alike.
+    pub fn fill(&mut self, part: PixelRect, record: &PixelRecord) {
+        for y in part.y0..part.y1 {
+            let first = self.idx([part.x0, y]);
+            let row = first..first + part.width() as usize;
+            self.colors[row.clone()].fill(record.color);
+            self.done[row.clone()].fill(true);
+            for (aov, plane) in &mut self.planes {
+                row.clone().for_each(|idx| plane.set(*aov, idx, record));
+            }
+        }
+    }
+
     fn idx(&self, pixel: [u32; 2]) -> usize {
         self.window.idx(pixel).expect("the pixel lies in the film's window")
     }
