@@ -33,7 +33,7 @@ pub struct RenderArgs {
     /// Picture to write: .exr (linear, 16-bit half, layers) or .png (8-bit sRGB)
     #[arg(short, long, value_name = "OUT.exr|OUT.png")]
     pub output: PathBuf,
-    /// Further layers of the EXR file, such as Z,N,patch
+    /// Further layers of the EXR file, such as Z,N,patch; group, reason and error get pictures beside a PNG
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = PICTURE)]
     pub aov: Vec<Aov>,
     /// Write the statistics as JSON
@@ -102,7 +102,7 @@ impl RenderArgs {
     /// Reads the scene file and settles everything that was left open.
     pub fn job(self) -> Result<RenderJob> {
         let format = PictureFormat::of(&self.output)?;
-        if format == PictureFormat::Png && !self.aov.is_empty() {
+        if format == PictureFormat::Png && !self.aov.iter().all(|&aov| output::is_drawn(aov)) {
             return Err(Error::input("--aov needs an EXR file: a PNG has no layers").at(&self.output, None));
         }
         for file in [Some(&self.output), self.stats.as_ref()].into_iter().flatten() {

@@ -24,6 +24,7 @@ use crate::scene::camera::Camera;
 use crate::scene::world::{World, WorldMesh};
 use crate::subdiv::{Dicer, PatchRates, SampleKind};
 use crate::topology::{HalfEdges, NONE};
+use glam::DVec3;
 
 /// Side, in pixels, of parts that are not cut further.
 const SMALL: f32 = 9.0;
@@ -65,6 +66,12 @@ const BLOCK_SIDE: usize = 8;
 /// Blocks along a side of what a tile knows.
 const BLOCKS: usize = (REACH as usize).div_ceil(BLOCK_SIDE);
 
+/// Parts of a cell along each side, at most: where cells are large, parts are smaller than they.
+const IN_CELL: u32 = 16;
+
+/// What rounding a vertex to the lattice may move it by, and more, in lattice units.
+const SNAP: f32 = 2.0;
+
 /// A scene as a camera sees it.
 pub(super) struct Scenery<'a> {
     world: &'a World,
@@ -95,8 +102,8 @@ pub(super) struct Footprints<'a> {
 struct Part {
     mesh: MeshId,
     patch: PatchId,
-    /// First column and row of cells, and the ends; `None` for the whole patch.
-    cells: Option<[[u16; 2]; 2]>,
+    /// First column and row, and the ends, in cells over [`IN_CELL`]; `None` for the whole patch.
+    cells: Option<[[u32; 2]; 2]>,
     /// No point of it is nearer; depth along the camera's forward direction.
     nearest: f32,
     /// Pixels within the tile's reach: x0, y0, x1, y1, the last two not included.
@@ -214,7 +221,7 @@ impl<'a> Footprints<'a> {
         }
     }
 
-    fn part(&self, mesh: MeshId, patch: PatchId, cells: Option<[[u16; 2]; 2]>, b: &Bounds) -> Option<Part> {
+    fn part(&self, mesh: MeshId, patch: PatchId, cells: Option<[[u32; 2]; 2]>, b: &Bounds) -> Option<Part> {
         let screen = self.scenery.project(mesh, b)?;
         let rect = reached(self.origin, &screen)?;
         let extent = (screen.max - screen.min).max_element() as f32;
@@ -311,18 +318,18 @@ impl<'a> Footprints<'a> {
         let Part { mesh: id, patch, cells, .. } = self.parts[k];
         let mesh = self.scenery.world.mesh(id);
         let rates = mesh.patch_rates(patch);
-        let [i, j] = cells.unwrap_or([[0, rates.n_u as u16], [0, rates.n_v as u16]]).map(|range| range.map(u32::from));
-        let [n_i, n_j] = [i, j].map(|[from, to]| (to - from).min(PIECES));
+        let [i, j] = cells.unwrap_or([rates.n_u, rates.n_v].map(|n| [0, n * IN_CELL]));
+        let is_flat = has_flat_cells(&rates);
+        let [n_i, n_j] = [i, j].map(|[from, to]| pieces(to - from, is_flat));
         if n_i * n_j == 1 || self.n_cut == MAX_CUT {
             return Children::None;
         }
         self.n_cut += 1;
         let first = self.parts.len();
-        let cut = |[from, to]: [u32; 2], n: u32, k: u32| [k, k + 1].map(|k| from + k * (to - from) / n);
         for (a, b) in (0..n_j).flat_map(|b| (0..n_i).map(move |a| (a, b))) {
-            let (i, j) = (cut(i, n_i, a), cut(j, n_j, b));
+            let (i, j) = (piece(i, n_i, a), piece(j, n_j, b));
             let bounds = part_box(&mut self.dicer, mesh, patch, &rates, i, j);
-            self.parts.extend(self.part(id, patch, Some([i, j].map(|range| range.map(|n| n as u16))), &bounds));
+            self.parts.extend(self.part(id, patch, Some([i, j]), &bounds));
         }
         Children::Some { first: first as u16, n: (self.parts.len() - first) as u8 }
     }
@@ -334,16 +341,22 @@ impl<'a> Footprints<'a> {
         let part = self.parts[k];
         let mesh = self.scenery.world.mesh(part.mesh);
         let rates = mesh.patch_rates(part.patch);
-        let whole = [[0, rates.n_u as u16], [0, rates.n_v as u16]];
-        let [[i0, i1], [j0, j1]] = part.cells.unwrap_or(whole);
-        let [[_, n_u], [_, n_v]] = whole;
-        let on_border = [j0 == 0, i1 == n_u, j1 == n_v, i0 == 0];
+        let ends = [rates.n_u, rates.n_v].map(|n| n * IN_CELL);
+        let [i, j] = part.cells.unwrap_or(ends.map(|end| [0, end]));
+        let on_border = [j[0] == 0, i[1] == ends[0], j[1] == ends[1], i[0] == 0];
         let is_open = on_border.iter().zip(open_sides(mesh, part.patch)).any(|(&at, open)| at && open);
+        let view = &self.scenery.views[part.mesh.idx()];
+        if is_in_cell(i, j) && has_flat_cells(&rates) && !is_open {
+            let cell = CellCorners::new(&mut self.dicer, mesh, part.patch, &rates, i, j);
+            let side = cell.side(view, i, j);
+            self.parts[k].side = Some(side);
+            return side;
+        }
+        let [[i0, i1], [j0, j1]] = [cells_around(i), cells_around(j)];
         let cosines = [[i0, j0], [i1, j0], [i1, j1], [i0, j1]].map(|[i, j]| {
-            let (u, v) = (f64::from(i) / f64::from(n_u), f64::from(j) / f64::from(n_v));
+            let (u, v) = (f64::from(i) / f64::from(rates.n_u), f64::from(j) / f64::from(rates.n_v));
             let sample = self.dicer.sample(mesh.surface(), part.patch, u, v);
             let known = sample.kind != SampleKind::PositionOnly;
-            let view = &self.scenery.views[part.mesh.idx()];
             if known { view.cosine(sample.position, sample.du.cross(sample.dv)) } else { f64::NAN }
         });
         let side = if is_open { Side::Mixed } else { side_of(cosines) };
@@ -382,6 +395,28 @@ fn is_marked(covered: &[u128], rect: [u8; 4]) -> bool {
     rows(rect.map(u32::from)).all(|(row, bits)| covered[row] & bits == bits)
 }
 
+/// Whether each cell's two triangles have the limit points of its corners, with no coarser neighbour's among them.
+fn has_flat_cells(rates: &PatchRates) -> bool {
+    rates.sides == [rates.n_u, rates.n_v, rates.n_u, rates.n_v]
+}
+
+/// How many pieces a range is cut into: of whole cells while there are several, then of one.
+fn pieces(length: u32, is_flat: bool) -> u32 {
+    let smallest = if is_flat { 1 } else { IN_CELL };
+    (length / smallest).clamp(1, PIECES)
+}
+
+/// One of `n` pieces of a range.
+fn piece([from, to]: [u32; 2], n: u32, k: u32) -> [u32; 2] {
+    let unit = if to - from > IN_CELL { IN_CELL } else { 1 };
+    [k, k + 1].map(|k| from + k * ((to - from) / unit) / n * unit)
+}
+
+/// The cells that a range reaches.
+fn cells_around([from, to]: [u32; 2]) -> [u32; 2] {
+    [from / IN_CELL, to.div_ceil(IN_CELL)]
+}
+
 fn part_box(
     dicer: &mut Dicer,
     mesh: &WorldMesh,
@@ -390,10 +425,78 @@ fn part_box(
     i: [u32; 2],
     j: [u32; 2],
 ) -> Bounds {
+    if is_in_cell(i, j) && has_flat_cells(rates) {
+        return CellCorners::new(dicer, mesh, patch, rates, i, j).bounds(i, j);
+    }
+    let [i, j] = [i, j].map(cells_around);
     // A part's cells are a part of the patch: as many splits lead to a quarter of its size.
     let largest = (i[1] - i[0]).max(j[1] - j[0]);
     let depth = (rates.n_u.max(rates.n_v) / largest).ilog2() + BOX_DEPTH;
     dicer.bounds(mesh.surface(), patch, rates, i, j, depth)
+}
+
+fn is_in_cell(i: [u32; 2], j: [u32; 2]) -> bool {
+    let is_within = |[from, to]: [u32; 2]| from / IN_CELL == (to - 1) / IN_CELL;
+    is_within(i) && is_within(j)
+}
+
+/// The vertices of one cell, (0,0), (1,0), (0,1) and (1,1), in lattice units, before they are rounded.
+///
+/// Its two triangles meet from (1,0) to (0,1). Parts of it are halves of halves, so that this line passes through corners of a
+/// part or misses it.
+struct CellCorners([DVec3; 4]);
+
+impl CellCorners {
+    /// Of the cell that a part lies in.
+    fn new(dicer: &mut Dicer, mesh: &WorldMesh, patch: PatchId, rates: &PatchRates, i: [u32; 2], j: [u32; 2]) -> Self {
+        let (column, row) = (i[0] / IN_CELL, j[0] / IN_CELL);
+        let place = |k: u32, n: u32| f64::from(k) / f64::from(n);
+        Self([[0, 0], [1, 0], [0, 1], [1, 1]].map(|[a, b]| {
+            dicer.sample(mesh.surface(), patch, place(column + a, rates.n_u), place(row + b, rates.n_v)).position
+        }))
+    }
+
+    /// A box of a part of the cell: its corners tell all.
+    fn bounds(&self, i: [u32; 2], j: [u32; 2]) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        for [s, t] in [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[a, b]| [within_cell(i)[a], within_cell(j)[b]]) {
+            bounds.grow(self.point(s, t).as_vec3());
+        }
+        Bounds { min: bounds.min - SNAP, max: bounds.max + SNAP }
+    }
+
+    fn point(&self, s: f64, t: f64) -> DVec3 {
+        let [v00, v10, v01, v11] = self.0;
+        if s + t <= 1.0 {
+            v00 + s * (v10 - v00) + t * (v01 - v00)
+        } else {
+            v11 + (1.0 - s) * (v01 - v11) + (1.0 - t) * (v10 - v11)
+        }
+    }
+
+    /// The side that the eye sees of the triangles that a part of the cell has to do with.
+    fn side(&self, view: &MeshView, i: [u32; 2], j: [u32; 2]) -> Side {
+        let [v00, v10, v01, v11] = self.0;
+        let ([s0, s1], [t0, t1]) = (within_cell(i), within_cell(j));
+        let halves = [(s0 + t0 < 1.0, v00, v10, v01), (s1 + t1 > 1.0, v11, v01, v10)];
+        let (mut outside, mut inside) = (true, true);
+        for (_, a, b, c) in halves.into_iter().filter(|(is_reached, ..)| *is_reached) {
+            let cosine = view.cosine(a, (b - a).cross(c - a));
+            outside &= cosine > SIDE_MARGIN;
+            inside &= cosine < -SIDE_MARGIN;
+        }
+        match (outside, inside) {
+            (true, false) => Side::Outside,
+            (false, true) => Side::Inside,
+            _ => Side::Mixed,
+        }
+    }
+}
+
+/// Where a range within a cell begins and ends, 0 to 1.
+fn within_cell(range: [u32; 2]) -> [f64; 2] {
+    let first = range[0] / IN_CELL * IN_CELL;
+    range.map(|at| f64::from(at - first) / f64::from(IN_CELL))
 }
 
 fn side_of(cosines: [f64; 4]) -> Side {
