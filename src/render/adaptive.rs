@@ -16,7 +16,7 @@
 //! 2. A tile depends on nothing but the scene, the camera and the settings; tiles lie at multiples of 64 pixels, whatever
 //!    the window. So neither threads nor a crop change a pixel.
 //! 3. A pixel that is not interpolated has, bit for bit, the colour that it has without groups; but where pixels have several
-//!    samples, one that looks like its neighbours after the first sample keeps that one alone.
+//!    samples, one that looks like its neighbours after the first sample, and the same after a second, keeps those two.
 //!
 //! Ke, "Feature Adaptive Ray Tracing of Subdivision Surfaces", 2017, chapter 5.3 (groups); Akimoto et al., "Pixel-selected
 //! ray tracing", 1991 (refinement by prediction).
@@ -31,7 +31,7 @@ use super::sampler::subpixel;
 use super::settings::{Appearance, RenderSettings, RunSettings};
 use super::tiles::PixelRect;
 use super::tracer::{Built, Tracer};
-use super::workers::{GroupSeconds, PixelTracer, Rendered, TileQueue, in_threads, render};
+use super::workers::{Exposure, GroupSeconds, PixelTracer, Rendered, TileQueue, in_threads, render};
 use crate::ids::{MeshId, PatchId};
 use crate::image::display::display_value;
 use crate::scene::camera::Camera;
@@ -201,7 +201,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
             };
             self.tile.set_cell(&place, cell);
         }
-        self.tile.split_beside_edges(level);
+        self.tile.split_beside_edges(level, !self.job.appearance.can_reshade());
     }
 
     fn trace_probe(&mut self, pixel: [u32; 2]) {
@@ -230,11 +230,14 @@ impl<T: Tracer> Worker<'_, '_, T> {
             Cell::Holds { .. } => interpolation.probed(&self.tile, &place, pixel).unwrap_or(background.interpolated()),
             Cell::Split(_) if self.footprints.is_empty(single(pixel)) => background,
             Cell::Split(reason) => {
-                let known = self.tile.probe(pixel).map(|p| (p.probe.sample, p.misses));
-                if let Some((sample, misses)) = known.filter(|_| self.is_sampled_by_need() && self.is_even(pixel)) {
-                    return PixelRecord { reason, samples: 1, ..PixelRecord::of_sample(&sample, misses) };
+                let probe = self.tile.probe(pixel);
+                let mut exposure = probe.map_or(Exposure::default(), |p| Exposure::new(&p.probe.sample, p.misses));
+                let is_done =
+                    self.is_sampled_by_need() && self.is_even(pixel) && self.is_confirmed(pixel, &mut exposure);
+                if !is_done {
+                    interpolation.pixels().expose(&mut self.shader, pixel, &mut exposure, interpolation.settings.spp);
                 }
-                PixelRecord { reason, ..interpolation.pixels().trace_from(&mut self.shader, pixel, known) }
+                PixelRecord { reason, ..exposure.record() }
             }
         }
     }
@@ -261,6 +264,13 @@ impl<T: Tracer> Worker<'_, '_, T> {
         }
     }
 
+    /// Whether a second sample of a pixel agrees with the first: what is smaller than a pixel, neighbours do not show.
+    fn is_confirmed(&mut self, pixel: [u32; 2], exposure: &mut Exposure) -> bool {
+        let first = exposure.mean();
+        self.job.pixels().expose(&mut self.shader, pixel, exposure, 2);
+        display_difference(first, exposure.mean()) <= 0.5 * self.job.settings.tolerance
+    }
+
     /// Whether a traced pixel and those around it, all of the tile, show one mesh in about one colour.
     fn is_even(&self, [x, y]: [u32; 2]) -> bool {
         let Some(own) = self.tile.probe([x, y]) else { return false };
@@ -276,11 +286,6 @@ impl<T: Tracer> Worker<'_, '_, T> {
 }
 
 impl PixelRecord {
-    fn of_sample(sample: &Sample, misses: Built) -> Self {
-        let background = Self::background(sample.radiance.to_array());
-        Self { first: sample.first, misses, ..background }
-    }
-
     fn interpolated(self) -> Self {
         Self { reason: Reason::Interpolated, ..self }
     }

@@ -153,10 +153,12 @@ impl Tile {
     }
 
     /// Splits the cells of a level that hold beside one with an edge in it: the edge may go on between their probes. The
-    /// silhouettes that matter to the smallest cells are known from footprints, so only edges of light spread to them.
-    pub fn split_beside_edges(&mut self, level: usize) {
+    /// silhouettes that matter to the smallest cells are known from footprints, so only edges of light spread to them. Where
+    /// `colors_alone` are interpolated, a contradiction is all that may be seen of such an edge.
+    pub fn split_beside_edges(&mut self, level: usize, colors_alone: bool) {
         let n = (TILE_SIDE / CELL_SIDES[level]) as usize;
-        let spreads = if level + 1 == CELL_SIDES.len() { Reason::is_edge_of_light } else { Reason::is_edge };
+        let is_edge = if level + 1 == CELL_SIDES.len() { Reason::is_edge_of_light } else { Reason::is_edge };
+        let spreads = |reason| is_edge(reason) || colors_alone && reason == Reason::Contradiction;
         let has_edge: Vec<bool> =
             self.cells[level].iter().map(|cell| matches!(cell, Cell::Split(reason) if spreads(*reason))).collect();
         for (k, cell) in self.cells[level].iter_mut().enumerate() {
@@ -196,7 +198,7 @@ mod tests {
         }
         let edge = tile.place(0, [64, 128]);
         tile.set_cell(&edge, Cell::Split(Reason::Shadow));
-        tile.split_beside_edges(0);
+        tile.split_beside_edges(0, false);
         let cells: Vec<_> = [[64, 128], [80, 144], [96, 128]].map(|p| tile.cell(&tile.place(0, p))).into();
         assert_eq!(cells, [Cell::Split(Reason::Shadow), Cell::Split(Reason::Neighbour), Cell::Holds { error: 0.0 }]);
     }

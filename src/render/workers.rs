@@ -1,6 +1,6 @@
 //! The threads that render tiles.
 
-use super::film::{Film, PixelRecord};
+use super::film::{Film, FirstHit, PixelRecord};
 use super::groups::NO_GROUP;
 use super::integrators::{Sample, Shader};
 use super::rays::RayCounts;
@@ -11,7 +11,7 @@ use super::tiles::{PixelRect, TileOrder};
 use super::tracer::{Built, Tracer};
 use crate::math::Ray;
 use crate::scene::camera::Camera;
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use parking_lot::Mutex;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
@@ -118,6 +118,48 @@ impl<'a> TileQueue<'a> {
     }
 }
 
+/// The samples of a pixel so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Exposure {
+    sum: DVec3,
+    n: u32,
+    first: Option<FirstHit>,
+    misses: Built,
+}
+
+impl Exposure {
+    /// Of a sample that was traced before, with so many misses.
+    pub fn new(sample: &Sample, misses: Built) -> Self {
+        let mut exposure = Self { misses, ..Self::default() };
+        exposure.add(sample);
+        exposure
+    }
+
+    fn add(&mut self, sample: &Sample) {
+        self.sum += sample.radiance.as_dvec3();
+        self.n += 1;
+        self.first.get_or_insert(sample.first);
+    }
+
+    /// Mean radiance of at least one sample.
+    pub fn mean(&self) -> Vec3 {
+        (self.sum / f64::from(self.n)).as_vec3()
+    }
+
+    /// The pixel, of at least one sample.
+    pub fn record(&self) -> PixelRecord {
+        PixelRecord {
+            color: self.mean().to_array(),
+            samples: self.n,
+            first: self.first.expect("a pixel has at least one sample"),
+            misses: self.misses,
+            group: NO_GROUP,
+            reason: Reason::Every,
+            error: 0.0,
+        }
+    }
+}
+
 /// Traces whole pixels.
 #[derive(Clone, Copy)]
 pub(super) struct PixelTracer<'a> {
@@ -128,35 +170,20 @@ pub(super) struct PixelTracer<'a> {
 impl PixelTracer<'_> {
     /// All samples of a pixel.
     pub fn trace<T: Tracer>(&self, shader: &mut Shader<'_, T>, pixel: [u32; 2]) -> PixelRecord {
-        self.trace_from(shader, pixel, None)
+        let mut exposure = Exposure::default();
+        self.expose(shader, pixel, &mut exposure, self.settings.spp);
+        exposure.record()
     }
 
-    /// All samples of a pixel whose first sample may have been traced, with so many misses, before.
-    pub fn trace_from<T: Tracer>(
-        &self,
-        shader: &mut Shader<'_, T>,
-        pixel: [u32; 2],
-        known: Option<(Sample, Built)>,
-    ) -> PixelRecord {
+    /// Goes on with a pixel's samples until there are `n`.
+    pub fn expose<T: Tracer>(&self, shader: &mut Shader<'_, T>, pixel: [u32; 2], exposure: &mut Exposure, n: u32) {
         let _witness = PanicWitness(pixel);
         let misses_before = shader.misses();
-        let mut sum = known.map_or(DVec3::ZERO, |(sample, _)| sample.radiance.as_dvec3());
-        let mut first = known.map(|(sample, _)| sample.first);
-        for i in u32::from(known.is_some())..self.settings.spp {
+        for i in exposure.n..n {
             let (ray, sampler) = self.sample(pixel, i);
-            let sample = shader.sample(self.camera, ray, sampler);
-            sum += sample.radiance.as_dvec3();
-            first.get_or_insert(sample.first);
+            exposure.add(&shader.sample(self.camera, ray, sampler));
         }
-        PixelRecord {
-            color: (sum / f64::from(self.settings.spp)).as_vec3().to_array(),
-            samples: self.settings.spp,
-            first: first.expect("a pixel has at least one sample"),
-            misses: shader.misses() - misses_before + known.map_or(Built::default(), |(_, misses)| misses),
-            group: NO_GROUP,
-            reason: Reason::Every,
-            error: 0.0,
-        }
+        exposure.misses = exposure.misses + (shader.misses() - misses_before);
     }
 
     /// The camera ray and the random numbers of one sample of a pixel.
