@@ -89,11 +89,27 @@ impl Tradeoff {
     }
 }
 
-const HEADINGS: [&str; 13] =
-    ["groups", "tolerance", "rate", "rays", "grids", "MiB", "seconds", "cpu", "max", "p99", "above", "ssim2", "missed"];
+const HEADINGS: [&str; 15] = [
+    "groups",
+    "tolerance",
+    "rate",
+    "rays",
+    "grids",
+    "MiB",
+    "seconds",
+    "cpu",
+    "max",
+    "p99",
+    "above",
+    "ssim2",
+    "cvvdp",
+    "worst tile",
+    "missed",
+];
 
 impl Display for Tradeoff {
-    /// A Markdown table, a line for each run. `above` is the share of pixels beyond the tolerance, in percent.
+    /// A Markdown table, a line for each run. `above` is the share of pixels beyond the tolerance, in percent; `worst tile`
+    /// the mean difference of the 32 x 32 pixels where it is largest.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         writeln!(f, "| {} |", HEADINGS.join(" | "))?;
         writeln!(f, "|{}", "---|".repeat(HEADINGS.len()))?;
@@ -106,10 +122,12 @@ fn write_row(f: &mut Formatter<'_>, run: &TradeoffRun) -> fmt::Result {
     write!(f, "| {} | {tolerance} | {} | {} | {} ", run.groups, run.rate, run.rays, run.grids)?;
     let mebibytes = run.bytes as f64 / f64::from(1 << 20);
     write!(f, "| {mebibytes:.1} | {:.2} | {:.2} ", run.wall_seconds, run.cpu_seconds)?;
-    let Some(e) = &run.error else { return writeln!(f, "| 0 | 0 | 0 | 100 | 0 |") };
-    let ssimulacra2 = e.ssimulacra2.map_or("-".to_owned(), |s| format!("{s:.1}"));
+    let Some(e) = &run.error else { return writeln!(f, "| 0 | 0 | 0 | 100 | 10 | 0 | 0 |") };
+    let score = |score: Option<f64>, digits: usize| score.map_or("-".to_owned(), |s| format!("{s:.digits$}"));
+    let (ssimulacra2, vdp) = (score(e.ssimulacra2, 1), score(e.color_video_vdp, 2));
     let above = 100.0 * run.share_above_tolerance;
-    writeln!(f, "| {:.4} | {:.4} | {above:.3} | {ssimulacra2} | {} |", e.max, e.p99, e.missed_objects)
+    write!(f, "| {:.4} | {:.4} | {above:.3} | {ssimulacra2} | {vdp} ", e.max, e.p99)?;
+    writeln!(f, "| {:.4} | {} |", e.worst_tile.mean, e.missed_objects)
 }
 
 #[cfg(test)]
