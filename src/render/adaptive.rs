@@ -1,6 +1,6 @@
 //! `--groups adaptive`: few rays, a bounded error.
 //!
-//! The picture is refined from cells of 16 pixels down to single ones. Nine **probes** of a cell are traced; it is
+//! The picture is refined from cells of 8 pixels down to single ones. Nine **probes** of a cell are traced; it is
 //! interpolated only if they have seen one piece of smooth surface under the same lights, if no patch could have slipped
 //! between them (`footprint`), and if the four corner probes predict the five others within the
 //! tolerance. Otherwise it is split in four. A group in Ke's sense is a cell that holds; it may span several patches,
