@@ -216,7 +216,7 @@ impl Evaluator {
         Target { us: (0, n_u), vs: (n_u, n), first: [0, 0] }
     }
 
-    /// As [`grid`](Self::grid) for 16 B-spline control points.
+    /// Positions at all pairs of parameters, for 16 B-spline control points.
     pub fn regular_grid(
         &mut self,
         control: &ControlPoints,

@@ -83,7 +83,7 @@ impl TopLevel {
     #[inline(always)]
     fn target(&self, node: u32, refs: &Refs, lane: usize) -> u32 {
         let reference = refs[lane % LANES];
-        if reference & LEAF != 0 { LEAF | node * LANES as u32 + lane as u32 } else { reference }
+        if reference & LEAF != 0 { LEAF | (node * LANES as u32 + lane as u32) } else { reference }
     }
 
     #[inline(always)]

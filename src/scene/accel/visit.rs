@@ -1,6 +1,6 @@
 //! A walk through the tree that is led by boxes instead of a ray.
 
-use super::{EMPTY, LANES, LEAF, NodeBoxes, TopLevel};
+use super::{EMPTY, LEAF, NodeBoxes, TopLevel};
 use crate::ids::PatchId;
 use crate::math::Bounds;
 use glam::Vec3;
@@ -21,8 +21,8 @@ impl TopLevel {
         let mut pending = vec![0u32];
         while let Some(node) = pending.pop() {
             let (boxes, refs) = (&self.nodes.boxes[node as usize], &self.nodes.refs[node as usize]);
-            for lane in 0..LANES {
-                match refs[lane] {
+            for (lane, &reference) in refs.iter().enumerate() {
+                match reference {
                     EMPTY => {}
                     reference if reference & LEAF != 0 => leaf(PatchId(reference & !LEAF), &boxes.bounds(lane)),
                     reference if enter(&boxes.bounds(lane)) => pending.push(reference),

@@ -7,7 +7,7 @@ use crate::subdiv::eval::{Evaluator, LEFT_FIRST, SurfaceSample, Target, quarter,
 use crate::subdiv::plan::PlanLibrary;
 
 impl Evaluator {
-    /// As [`grid`](Self::grid) for a patch under edits.
+    /// As `grid` for a patch under edits.
     pub fn edited_grid(
         &mut self,
         library: &PlanLibrary,
@@ -56,7 +56,7 @@ impl Evaluator {
         }
     }
 
-    /// As [`bounds`](Self::bounds) for a patch under edits.
+    /// As `bounds` for a patch under edits.
     pub fn edited_bounds(
         &mut self,
         library: &PlanLibrary,
