@@ -1,4 +1,5 @@
 //! What does a frame of camera rays cost: cold, warm, with a cache of an eighth or a hundredth of what it touches, with none?
+//! And what if everything is tessellated before it?
 //!
 //! `cargo bench --bench frame`
 
@@ -65,6 +66,20 @@ fn cold(bencher: Bencher) {
         .counter(ItemsCount::new(rays.len()))
         .with_inputs(|| cache(&world, CacheConfig::with_bytes(64 << 20)))
         .bench_refs(|cache| trace(&world, cache, &rays));
+}
+
+/// As [`cold`], but every block of every patch is built before the first ray.
+#[divan::bench]
+fn tessellated_before(bencher: Bencher) {
+    let world = world();
+    let rays = rays(&world);
+    bencher
+        .counter(ItemsCount::new(rays.len()))
+        .with_inputs(|| cache(&world, CacheConfig::with_bytes(64 << 20)))
+        .bench_refs(|cache| {
+            Intersector::new(&world, cache).tessellate_everything();
+            trace(&world, cache, &rays)
+        });
 }
 
 /// Nothing is built.

@@ -9,7 +9,8 @@
 //!
 //! A secondary ray starts `1e-4 diag` above the hit along the geometric normal and is cosine-distributed about it; its two
 //! random numbers are hashes of (pixel, 2 sample) and (pixel, 2 sample + 1). Rays and results are f32, built before any
-//! clock starts. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of
+//! clock starts. With `batch` above 0, secondary rays are handed over in batches of so many, for the tracer to put into
+//! an order of its own: no part of the recipe. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of
 //! the threads (`cpu`).
 
 use crate::io::process::thread_cpu;
@@ -90,6 +91,8 @@ pub struct BenchSettings {
     pub threads: usize,
     /// Occlusion rays per hit.
     pub ao: u32,
+    /// Secondary rays handed over at a time; 0: one by one, as the recipe has it.
+    pub batch: usize,
     /// Passes of each measurement.
     pub repeat: usize,
     /// Which passes to run besides the first primary one: primary, AO, diffuse.
@@ -129,6 +132,13 @@ pub struct BenchResult {
     pub diffuse_rays: usize,
     /// Share of them that hit.
     pub diffuse_hit: f64,
+}
+
+impl BenchSettings {
+    /// Secondary rays of one task.
+    fn task_size(&self) -> usize {
+        if self.batch > 0 { self.batch } else { CHUNK }
+    }
 }
 
 /// The rays of the recipe and their results.
@@ -187,7 +197,7 @@ impl Bench {
         }
         if self.settings.passes[2] {
             let rays = &diffuse;
-            let mut hits = vec![0u8; rays.len()];
+            let mut hits = vec![false; rays.len()];
             result.diffuse_tile_order = Some(self.run_diffuse(&make_tracer, rays, &mut hits));
             for i in (2..=diffuse.len()).rev() {
                 diffuse.swap(i - 1, (hash2(i as u32, 77) as usize) % i);
@@ -225,14 +235,18 @@ impl Bench {
     }
 
     fn run_ao<T: Intersect>(&self, make_tracer: &(impl Fn() -> T + Sync), rays: &[BenchRay], result: &mut BenchResult) {
-        let mut occluded = vec![0u8; rays.len()];
-        let mut chunks: Vec<&mut [u8]> = occluded.chunks_mut(CHUNK).collect();
-        let mut pass = |threads| {
-            parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
+        let mut occluded = vec![false; rays.len()];
+        let batch = self.in_batches(rays);
+        let mut chunks: Vec<&mut [bool]> = occluded.chunks_mut(self.settings.task_size()).collect();
+        let mut pass = |threads| match &batch {
+            Some(batch) => parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
+                tracer.occluded_batch(&batch[chunk * self.settings.batch..][..out.len()], out);
+            }),
+            None => parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
                 for (ray, out) in rays[chunk * CHUNK..].iter().zip(out.iter_mut()) {
-                    *out = u8::from(tracer.occluded(&ray.ray()));
+                    *out = tracer.occluded(&ray.ray());
                 }
-            })
+            }),
         };
         result.ao_first_s = pass(self.settings.threads).0;
         result.ao = Some(measure(&self.settings, rays.len(), &mut pass));
@@ -244,16 +258,42 @@ impl Bench {
         &self,
         make_tracer: &(impl Fn() -> T + Sync),
         rays: &[BenchRay],
-        hits: &mut [u8],
+        is_hit: &mut [bool],
     ) -> Rates {
-        let mut chunks: Vec<&mut [u8]> = hits.chunks_mut(CHUNK).collect();
+        if let Some(rays) = self.in_batches(rays) {
+            return self.run_diffuse_in_batches(make_tracer, &rays, is_hit);
+        }
+        let mut chunks: Vec<&mut [bool]> = is_hit.chunks_mut(CHUNK).collect();
         measure(&self.settings, rays.len(), &mut |threads| {
             parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
                 for (ray, out) in rays[chunk * CHUNK..].iter().zip(out.iter_mut()) {
-                    *out = u8::from(tracer.closest(&ray.ray()).is_some());
+                    *out = tracer.closest(&ray.ray()).is_some();
                 }
             })
         })
+    }
+
+    fn run_diffuse_in_batches<T: Intersect>(
+        &self,
+        make_tracer: &(impl Fn() -> T + Sync),
+        rays: &[Ray],
+        is_hit: &mut [bool],
+    ) -> Rates {
+        let size = self.settings.batch;
+        let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
+        let mut chunks: Vec<&mut [Option<Hit>]> = hits.chunks_mut(size).collect();
+        let rates = measure(&self.settings, rays.len(), &mut |threads| {
+            parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
+                tracer.closest_batch(&rays[chunk * size..][..out.len()], out);
+            })
+        });
+        is_hit.iter_mut().zip(&hits).for_each(|(is_hit, hit)| *is_hit = hit.is_some());
+        rates
+    }
+
+    /// The rays as the tracer takes them in batches, if it is to get them so.
+    fn in_batches(&self, rays: &[BenchRay]) -> Option<Vec<Ray>> {
+        (self.settings.batch > 0).then(|| rays.iter().map(BenchRay::ray).collect())
     }
 
     /// AO and diffuse rays from the primary hits.
@@ -308,15 +348,15 @@ fn split<'a, T>(mut items: &'a mut [T], starts: &[usize]) -> Vec<&'a mut [T]> {
         .collect()
 }
 
-fn share(flags: &[u8]) -> f64 {
+fn share(flags: &[bool]) -> f64 {
     if flags.is_empty() {
         return 0.0;
     }
-    flags.iter().map(|&f| u64::from(f)).sum::<u64>() as f64 / flags.len() as f64
+    flags.iter().filter(|&&f| f).count() as f64 / flags.len() as f64
 }
 
 /// Runs all tasks on `threads` threads; returns wall seconds and the CPU seconds of all threads.
-fn parallel<T: Intersect, R: Send>(
+fn parallel<T, R: Send>(
     threads: usize,
     make_tracer: &(impl Fn() -> T + Sync),
     tasks: &mut [&mut [R]],
@@ -420,7 +460,8 @@ mod tests {
 
     #[test]
     fn tiles_cover_every_pixel_once() {
-        let settings = BenchSettings { size: [37, 21], threads: 1, ao: 1, repeat: 1, passes: [true; 3], diagonal: 1.0 };
+        let settings =
+            BenchSettings { size: [37, 21], threads: 1, ao: 1, batch: 0, repeat: 1, passes: [true; 3], diagonal: 1.0 };
         let description =
             crate::scene::description::CameraDescription { eye: DVec3::ZERO, at: DVec3::X, up: DVec3::Y, fov: 35.0 };
         let mut pixels = Bench::new(&Camera::new(&description), settings).pixel;

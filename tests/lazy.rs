@@ -69,6 +69,67 @@ fn uneven(mesh: &ControlMesh, pieces: f64) -> DicingRate {
 }
 
 #[test]
+fn batches_answer_as_single_rays_do() {
+    let mut random = Random(0xba7c_4e55);
+    for (name, mesh) in shapes::all() {
+        let moved = DAffine3::from_translation(DVec3::new(0.5, 1.5, -0.3));
+        let parts =
+            vec![(mesh.clone(), DAffine3::IDENTITY, DicingRate::Fixed(11)), (mesh, moved, DicingRate::Fixed(4))];
+        let world = world_of(parts.into_iter().take(1 + random.below(2)).collect());
+        let ample = cache_of(&world, CacheConfig::with_bytes(16 << 20));
+        let mut one_by_one = Intersector::new(&world, &ample);
+        let rays = rays_and_onward_rays(&world, &mut one_by_one, &mut random);
+        let wanted: Vec<Option<Hit>> = rays.iter().map(|ray| one_by_one.closest(ray)).collect();
+        for bytes in [0, 4 << 10, 64 << 10, 16 << 20] {
+            let cache = cache_of(&world, CacheConfig::with_bytes(bytes));
+            let mut tracer = Intersector::new(&world, &cache);
+            for size in [1, 7, rays.len()] {
+                for (rays, wanted) in rays.chunks(size).zip(wanted.chunks(size)) {
+                    let mut hits = vec![None; rays.len()];
+                    tracer.closest_batch(rays, &mut hits);
+                    assert_eq!(format!("{hits:?}"), format!("{wanted:?}"), "{name}, {bytes} bytes, {size} at a time");
+                    let mut occluded = vec![true; rays.len()];
+                    tracer.occluded_batch(rays, &mut occluded);
+                    assert!(occluded.iter().zip(wanted).all(|(o, hit)| *o == hit.is_some()), "{name}, {bytes} bytes");
+                }
+            }
+        }
+    }
+}
+
+/// Random rays, and those that go on from their hits, shuffled.
+fn rays_and_onward_rays(world: &World, tracer: &mut Intersector<'_>, random: &mut Random) -> Vec<Ray> {
+    let bounds = world.meshes().iter().map(WorldMesh::bounds_in_world).fold(DBounds::EMPTY, DBounds::union);
+    let mut rays: Vec<Ray> = (0..100).map(|_| random.ray(bounds)).collect();
+    for i in 0..rays.len() {
+        let Some(hit) = tracer.closest(&rays[i]) else { continue };
+        let origin = rays[i].origin + f64::from(hit.t) * rays[i].direction;
+        rays.push(Ray { from: Some(hit.primitive), t_max: 2.0, ..Ray::new(origin, random.in_cube()) });
+    }
+    for i in (1..rays.len()).rev() {
+        rays.swap(i, random.below(i + 1));
+    }
+    rays
+}
+
+#[test]
+fn nothing_is_left_to_build_after_everything_was_tessellated() {
+    for (name, mesh) in shapes::all() {
+        let world = world_of(vec![(mesh, DAffine3::IDENTITY, DicingRate::Fixed(37))]);
+        let cache = cache_of(&world, CacheConfig::with_bytes(256 << 20));
+        let mut tracer = Intersector::new(&world, &cache);
+        tracer.tessellate_everything();
+        let n_built = tracer.n_built();
+        assert!(n_built > 0, "{name}");
+        let (mut random, bounds) = (Random(0x5eed_0002), world.meshes()[0].bounds_in_world());
+        for _ in 0..200 {
+            let _ = tracer.closest(&random.ray(bounds));
+        }
+        assert_eq!(tracer.n_built(), n_built, "{name}");
+    }
+}
+
+#[test]
 fn every_shape_at_even_and_odd_rates() {
     for (name, mesh) in shapes::all() {
         for rate in [1, 4, 11] {

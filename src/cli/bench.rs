@@ -49,6 +49,9 @@ pub struct BenchArgs {
     /// Ambient occlusion rays at each hit
     #[arg(long, default_value_t = 8, value_name = "N")]
     ao: u32,
+    /// Hand secondary rays over N at a time, for the tracer to put into an order of its own; 0: one by one, as given
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    batch: usize,
     /// Passes of each measurement
     #[arg(long, default_value_t = 5, value_name = "K", value_parser = count)]
     repeat: u32,
@@ -89,6 +92,8 @@ struct Report {
     width: u32,
     height: u32,
     eye: [f64; 3],
+    /// Secondary rays handed over at a time; 0: one by one.
+    batch: usize,
     #[serde(flatten)]
     result: BenchResult,
     rss_end_kb: i64,
@@ -109,6 +114,7 @@ impl BenchArgs {
             size: self.size,
             threads,
             ao: self.ao,
+            batch: self.batch,
             repeat: self.repeat as usize,
             passes: [RayKind::Primary, RayKind::Ao, RayKind::Diffuse].map(|k| self.rays.contains(&k)),
             diagonal: bounds.diagonal(),
@@ -141,6 +147,7 @@ impl BenchArgs {
             width: self.size[0],
             height: self.size[1],
             eye: description.eye.to_array(),
+            batch: self.batch,
             result,
             rss_end_kb: (resident_bytes().unwrap_or(0) as i64 - rss_before as i64) / 1024,
             hwm_kb: peak_resident_bytes().unwrap_or(0) / 1024,

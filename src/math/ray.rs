@@ -72,4 +72,14 @@ pub trait Intersect {
     fn closest(&mut self, ray: &Ray) -> Option<Hit>;
     /// Whether anything is hit.
     fn occluded(&mut self, ray: &Ray) -> bool;
+    /// [`closest`](Self::closest) for each of the rays, in whatever order is fast; `hits` is as long as `rays`.
+    fn closest_batch(&mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len());
+        rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.closest(ray));
+    }
+    /// [`occluded`](Self::occluded) for each of the rays, in whatever order is fast; `occluded` is as long as `rays`.
+    fn occluded_batch(&mut self, rays: &[Ray], occluded: &mut [bool]) {
+        assert_eq!(rays.len(), occluded.len());
+        rays.iter().zip(occluded).for_each(|(ray, is_hit)| *is_hit = self.occluded(ray));
+    }
 }

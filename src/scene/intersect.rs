@@ -5,6 +5,7 @@
 //! spot, so nothing is tessellated but what a ray reaches.
 
 use super::accel::TraversalStack;
+use super::batch::{BatchOrder, MOST_RAYS};
 use super::costs::BuildCosts;
 use super::world::{GridCache, World, WorldMesh};
 use crate::cache::{Block, BlockLayout, Claim, Pin, Recorder, Slot, SlotId, TraceLog, Visit};
@@ -15,7 +16,7 @@ use crate::grid::{
 use crate::ids::{MeshId, PatchId};
 use crate::math::LatticeGrid;
 use crate::math::simd::{self, Best, Kernel, Task};
-use crate::math::{Bounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
+use crate::math::{Bounds, DBounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
 use crate::subdiv::{Dicer, PatchRates};
 use glam::DVec3;
 
@@ -29,6 +30,30 @@ const CHILD_BOX_DEPTH: u32 = 3;
 const N_RATES: usize = 16;
 
 /// One thread's access to the scene's geometry.
+///
+/// Rays that are near each other need the same blocks. Where the caller has many rays in no such order, a batch finds one:
+///
+/// ```
+/// use glam::{DAffine3, DVec3};
+/// use lazytess::cache::CacheConfig;
+/// use lazytess::math::{Intersect, Ray};
+/// use lazytess::mesh::shapes;
+/// use lazytess::scene::intersect::Intersector;
+/// use lazytess::scene::rate::DicingRate;
+/// use lazytess::scene::world::{GridCache, World, WorldMesh};
+///
+/// let (_, mesh) = shapes::all().into_iter().next().expect("a shape");
+/// let world = World::new(vec![WorldMesh::new(mesh, DAffine3::IDENTITY, DicingRate::Fixed(8), 1)?]);
+/// let cache = GridCache::new(&world, CacheConfig::with_bytes(1 << 20))?;
+/// let center = world.meshes()[0].bounds_in_world().center();
+/// let rays = [DVec3::X, DVec3::Y, DVec3::Z].map(|from| Ray::new(center + 100.0 * from, -from));
+///
+/// let mut tracer = Intersector::new(&world, &cache);
+/// let mut hits = [None; 3];
+/// tracer.closest_batch(&rays, &mut hits);
+/// assert_eq!(hits.map(|hit| hit.map(|h| h.t)), rays.map(|ray| tracer.closest(&ray).map(|h| h.t)));
+/// # Ok::<(), lazytess::Error>(())
+/// ```
 pub struct Intersector<'w> {
     world: &'w World,
     cache: &'w GridCache,
@@ -37,6 +62,7 @@ pub struct Intersector<'w> {
     /// Remembers other patches than the builder's: those that shading asks about.
     shading: Dicer,
     stacks: Stacks,
+    order: BatchOrder,
     kernel: Best,
 }
 
@@ -156,6 +182,25 @@ impl Builder<'_> {
             }
         }
         [n_u as u8, n_v as u8]
+    }
+
+    /// Builds the block over these cells, or over the whole patch, and those below it, as far as they are missing.
+    fn complete<'v>(&mut self, visit: &'v Visit<'_>, slot: Slot<'v>, of: PatchContext<'_>, cells: Option<CellRect>) {
+        let block = visit.get(slot).unwrap_or_else(|| self.build(visit, slot, of, cells));
+        if !is_node(block.bytes()) {
+            return;
+        }
+        let cells = NodeView::new(block.bytes()).cells();
+        let side = child_side(cells);
+        let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
+        for (b, a) in (0..n_v).flat_map(|b| (0..n_u).map(move |a| (b, a))) {
+            let c = child_cells(cells, side, a, b);
+            let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
+            let surface = of.mesh.surface();
+            if !surface.edited().hide_cells(of.patch, &of.mesh.patch_rates(of.patch), i, j) {
+                self.complete(visit, block.child((b * NODE_SIDE + a) as usize), of, Some(c));
+            }
+        }
     }
 
     /// Builds the first block of a patch.
@@ -497,6 +542,7 @@ impl<'w> Intersector<'w> {
     /// A tracer for one thread.
     pub fn new(world: &'w World, cache: &'w GridCache) -> Self {
         let pin = cache.segments().pin();
+        let boxes = world.meshes().iter().map(WorldMesh::bounds_in_world);
         Self {
             world,
             cache,
@@ -504,6 +550,7 @@ impl<'w> Intersector<'w> {
             builder: Builder { recorder: cache.trace().map(TraceLog::recorder), ..Default::default() },
             shading: Dicer::default(),
             stacks: Stacks::default(),
+            order: BatchOrder::new(boxes.fold(DBounds::EMPTY, DBounds::union)),
             kernel: Best::detect(),
         }
     }
@@ -521,6 +568,20 @@ impl<'w> Intersector<'w> {
     /// Bytes of them.
     pub fn bytes_built(&self) -> u64 {
         self.pin.bytes_built()
+    }
+
+    /// Builds every block of every patch, as if rays had asked for all of them: what a program that tessellates
+    /// beforehand would do.
+    pub fn tessellate_everything(&mut self) {
+        let Self { world, cache, pin, builder, .. } = self;
+        for (mesh, id) in world.meshes().iter().zip((0..).map(MeshId)) {
+            for leaf in mesh.top().leaves() {
+                let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
+                let visit = &pin.visit();
+                cache.touch(id, leaf.slot);
+                builder.complete(visit, visit.root(cache.table(id), SlotId(leaf.slot)), of, None);
+            }
+        }
     }
 
     /// The limit surface's normal at a hit, in object space, along du x dv and not normalised; zero where there is none.
@@ -591,5 +652,22 @@ impl Intersect for Intersector<'_> {
             .occluded(simd::Portable, &scene_ray, &mut stack, |leaf| occluded_by(self, MeshId(leaf.patch.0)));
         self.stacks.scene = stack;
         hit
+    }
+    fn closest_batch(&mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len());
+        for (rays, hits) in rays.chunks(MOST_RAYS).zip(hits.chunks_mut(MOST_RAYS)) {
+            let order = self.order.of(rays);
+            order.rays().for_each(|i| hits[i] = self.closest(&rays[i]));
+            self.order.keep(order);
+        }
+    }
+
+    fn occluded_batch(&mut self, rays: &[Ray], occluded: &mut [bool]) {
+        assert_eq!(rays.len(), occluded.len());
+        for (rays, occluded) in rays.chunks(MOST_RAYS).zip(occluded.chunks_mut(MOST_RAYS)) {
+            let order = self.order.of(rays);
+            order.rays().for_each(|i| occluded[i] = self.occluded(&rays[i]));
+            self.order.keep(order);
+        }
     }
 }
