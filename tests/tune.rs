@@ -25,6 +25,13 @@ fn folder_with_ground() -> tempfile::TempDir {
     folder
 }
 
+/// The share of look-ups that built nothing. In a cache of a few dozen blocks a pin can leave no place for one, which the thread
+/// then keeps for itself: that its look-ups find it there is counted apart, but the replay knows one memory only.
+fn share_found(cache: &Value) -> f64 {
+    let count = |key: &str| cache[key].as_f64().unwrap();
+    (count("hits") + count("private_hits")) / count("lookups")
+}
+
 #[test]
 fn predicted_hit_rates_are_those_of_real_renders() {
     let folder = folder_with_ground();
@@ -37,7 +44,7 @@ fn predicted_hit_rates_are_those_of_real_renders() {
             ["render", "ground.obj", "-o", "g.png", "--stats", "s.json", "--ao-samples", "4", "--cache", &bytes];
         lazytess(folder.path(), &arguments);
         let real: Value = serde_json::from_slice(&std::fs::read(folder.path().join("s.json")).unwrap()).unwrap();
-        let (real, predicted) = (real["cache"]["hit_rate"].as_f64().unwrap(), point["hit_rate"].as_f64().unwrap());
+        let (real, predicted) = (share_found(&real["cache"]), point["hit_rate"].as_f64().unwrap());
         println!("{bytes} bytes: {predicted} predicted, {real} real");
         assert!((real - predicted).abs() < 0.01, "{bytes} bytes: {predicted} predicted, {real} real");
     }
