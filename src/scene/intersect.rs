@@ -3,31 +3,22 @@
 //! A ray walks a mesh's tree to a **leaf**, a patch. The leaf's slot leads to a block: a piece if the patch has at most
 //! 8 x 8 cells, else a node whose children are nodes or pieces in their turn. A block that is missing is built on the
 //! spot, so nothing is tessellated but what a ray reaches.
+//!
+//! `entrance.rs` takes a ray into a mesh's lattice, `accel` to its patches, `patch_walk.rs` through a patch; `builder.rs`
+//! builds what is missing.
 
 use super::accel::TraversalStack;
 use super::batch::{BatchOrder, MOST_RAYS};
-use super::costs::BuildCosts;
+use super::builder::{Builder, PatchContext};
+use super::patch_walk::{ClosestInPatch, OccludedInPatch};
 use super::world::{GridCache, World, WorldMesh};
-use crate::cache::{Block, BlockLayout, Claim, Pin, Recorder, Slot, SlotId, TraceLog, Visit};
-use crate::grid::{
-    CellRect, LaneHits, LatticeHit, LatticeRay, MAX_CELLS, NODE_BYTES, NodeView, PieceLayout, PieceView, TriangleId,
-    encode_node, is_node,
-};
-use crate::ids::{MeshId, PatchId};
-use crate::math::LatticeGrid;
+use crate::cache::{Pin, SlotId, TraceLog};
+use crate::grid::{LatticeHit, LatticeRay, TriangleId};
+use crate::ids::MeshId;
 use crate::math::simd::{self, Best, Kernel, Task};
-use crate::math::{Bounds, DBounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
-use crate::subdiv::{Dicer, PatchRates};
+use crate::math::{DBounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
+use crate::subdiv::Dicer;
 use glam::DVec3;
-
-/// Children of a node along u and v.
-const NODE_SIDE: u32 = 4;
-
-/// Quarters towards an irregular corner that a node's child boxes look into, below the child's own size.
-const CHILD_BOX_DEPTH: u32 = 3;
-
-/// Patches whose rates a builder remembers.
-const N_RATES: usize = 16;
 
 /// One thread's access to the scene's geometry.
 ///
@@ -66,208 +57,10 @@ pub struct Intersector<'w> {
     kernel: Best,
 }
 
-/// What building a block needs.
-#[derive(Default)]
-struct Builder<'w> {
-    dicer: Dicer,
-    vertices: LatticeGrid,
-    boxes: Vec<Bounds>,
-    n_built: u64,
-    n_pieces: u64,
-    n_triangles: u64,
-    costs: BuildCosts,
-    /// Rates of the last patches, one for each remainder of patch numbers.
-    rates: [Option<(MeshId, PatchId, PatchRates)>; N_RATES],
-    /// Notes every block that is asked for, if the cache wants to know.
-    recorder: Option<Recorder<'w>>,
-}
-
 #[derive(Default)]
 struct Stacks {
     scene: TraversalStack,
     mesh: TraversalStack,
-}
-
-/// A patch about to be traversed.
-#[derive(Clone, Copy)]
-struct PatchContext<'a> {
-    id: MeshId,
-    mesh: &'a WorldMesh,
-    patch: PatchId,
-}
-
-/// The side of a node's children in cells: 8, or as many times 4 that as leave at most 4 children a side.
-fn child_side(cells: CellRect) -> u32 {
-    let longest = cells.size().into_iter().max().expect("two sides") as u32;
-    let mut side = MAX_CELLS as u32;
-    while longest > NODE_SIDE * side {
-        side *= NODE_SIDE;
-    }
-    side
-}
-
-/// Cells of child (a, b) of a node.
-fn child_cells(parent: CellRect, side: u32, a: u32, b: u32) -> CellRect {
-    let (i0, j0) = (u32::from(parent.i0) + a * side, u32::from(parent.j0) + b * side);
-    CellRect {
-        i0: i0 as u16,
-        j0: j0 as u16,
-        i1: (i0 + side).min(u32::from(parent.i1)) as u16,
-        j1: (j0 + side).min(u32::from(parent.j1)) as u16,
-    }
-}
-
-impl Builder<'_> {
-    /// Builds the block over these cells, or over the whole patch.
-    #[cold]
-    #[inline(never)]
-    fn build<'v>(
-        &mut self,
-        visit: &'v Visit<'_>,
-        slot: Slot<'v>,
-        of: PatchContext<'_>,
-        cells: Option<CellRect>,
-    ) -> Block<'v> {
-        let ticket = match visit.claim(slot) {
-            Claim::Ready(block) => return block,
-            Claim::Build(ticket) => ticket,
-        };
-        self.n_built += 1;
-        self.costs.add(of.id, of.patch, 1);
-        let rates = self.rates(of);
-        let cells = cells.unwrap_or(CellRect { i0: 0, j0: 0, i1: rates.n_u as u16, j1: rates.n_v as u16 });
-        let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
-        if cells.size().iter().all(|&n| n <= MAX_CELLS) {
-            self.dicer.dice(of.mesh.surface(), of.patch, &rates, i, j, &mut self.vertices);
-            self.n_pieces += 1;
-            self.n_triangles += 2 * cells.size().iter().product::<usize>() as u64;
-            let layout = PieceLayout::new(&self.vertices, cells, [rates.n_u as u16, rates.n_v as u16]);
-            let vertices = &self.vertices;
-            return ticket
-                .publish(BlockLayout { bytes: layout.bytes(), children: 0 }, |out| layout.encode(vertices, out));
-        }
-        let children = self.child_boxes(of, &rates, cells);
-        let n_slots = (NODE_SIDE * u32::from(children[1] - 1)) as usize + usize::from(children[0]);
-        let boxes = &self.boxes;
-        ticket.publish(BlockLayout { bytes: NODE_BYTES, children: n_slots }, |out| {
-            encode_node(cells, children, boxes, out);
-        })
-    }
-
-    /// How finely a patch is diced: the same for its node and all its pieces.
-    fn rates(&mut self, of: PatchContext<'_>) -> PatchRates {
-        let remembered = &mut self.rates[of.patch.idx() % N_RATES];
-        match remembered {
-            Some((mesh, patch, rates)) if (*mesh, *patch) == (of.id, of.patch) => *rates,
-            _ => remembered.insert((of.id, of.patch, of.mesh.patch_rates(of.patch))).2,
-        }
-    }
-
-    /// Puts the boxes of a node's children into `self.boxes`; returns their number along u and v.
-    fn child_boxes(&mut self, of: PatchContext<'_>, rates: &PatchRates, cells: CellRect) -> [u8; 2] {
-        let side = child_side(cells);
-        let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
-        // A child's cells are a part of the patch: as many splits lead to a quarter of its size.
-        let depth = (rates.n_u.max(rates.n_v) / side).max(1).ilog2() + CHILD_BOX_DEPTH;
-        self.boxes.clear();
-        for b in 0..n_v {
-            for a in 0..n_u {
-                let c = child_cells(cells, side, a, b);
-                let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
-                let surface = of.mesh.surface();
-                self.boxes.push(match surface.edited().hide_cells(of.patch, rates, i, j) {
-                    true => Bounds::EMPTY,
-                    false => self.dicer.bounds(surface, of.patch, rates, i, j, depth),
-                });
-            }
-        }
-        [n_u as u8, n_v as u8]
-    }
-
-    /// Builds the block over these cells, or over the whole patch, and those below it, as far as they are missing.
-    fn complete<'v>(&mut self, visit: &'v Visit<'_>, slot: Slot<'v>, of: PatchContext<'_>, cells: Option<CellRect>) {
-        let block = visit.get(slot).unwrap_or_else(|| self.build(visit, slot, of, cells));
-        if !is_node(block.bytes()) {
-            return;
-        }
-        let cells = NodeView::new(block.bytes()).cells();
-        let side = child_side(cells);
-        let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
-        for (b, a) in (0..n_v).flat_map(|b| (0..n_u).map(move |a| (b, a))) {
-            let c = child_cells(cells, side, a, b);
-            let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
-            let surface = of.mesh.surface();
-            if !surface.edited().hide_cells(of.patch, &of.mesh.patch_rates(of.patch), i, j) {
-                self.complete(visit, block.child((b * NODE_SIDE + a) as usize), of, Some(c));
-            }
-        }
-    }
-
-    /// Builds the first block of a patch.
-    #[cold]
-    #[inline(never)]
-    fn build_root<'v>(
-        &mut self,
-        visit: &'v Visit<'_>,
-        slot: Slot<'v>,
-        of: PatchContext<'_>,
-        cache: &GridCache,
-        leaf_slot: u32,
-    ) -> Block<'v> {
-        cache.touch(of.id, leaf_slot);
-        self.build(visit, slot, of, None)
-    }
-
-    #[inline(always)]
-    fn note_root(&mut self, of: PatchContext<'_>, leaf_slot: u32, block: Block<'_>) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.root(name_of(of.id, leaf_slot), block);
-        }
-    }
-
-    #[inline(always)]
-    fn note_child(&mut self, level: usize, lane: usize, block: Block<'_>) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.child(level, lane, block);
-        }
-    }
-}
-
-/// One number for a slot of any mesh.
-fn name_of(mesh: MeshId, slot: u32) -> u64 {
-    u64::from(mesh.0) << 32 | u64::from(slot)
-}
-
-/// A node on the way down a patch, and which of its children are still to be seen.
-struct Level<'v> {
-    block: Block<'v>,
-    cells: CellRect,
-    side: u32,
-    hits: LaneHits,
-}
-
-/// Levels of nodes above a piece: 8 * 4^5 cells are more than [`crate::subdiv::dice::MAX_RATE`].
-const MAX_LEVELS: usize = 5;
-
-impl<'v> Level<'v> {
-    #[inline(always)]
-    fn new<K: Kernel>(kernel: K, visit: &Visit<'_>, block: Block<'v>, ray: &LatticeRay, t_max: f32) -> Self {
-        let node = NodeView::new(block.bytes());
-        let cells = node.cells();
-        let hits = node.test(kernel, ray, t_max);
-        let mut lanes = hits.mask;
-        while lanes != 0 {
-            visit.prefetch(block.child(lanes.trailing_zeros() as usize));
-            lanes &= lanes - 1;
-        }
-        Self { block, cells, side: child_side(cells), hits }
-    }
-
-    #[inline(always)]
-    fn child(&self, lane: usize) -> (Slot<'v>, CellRect) {
-        let (a, b) = (lane as u32 % NODE_SIDE, lane as u32 / NODE_SIDE);
-        (self.block.child(lane), child_cells(self.cells, self.side, a, b))
-    }
 }
 
 /// The ray as the mesh's lattice sees it. `t` keeps its meaning.
@@ -319,59 +112,6 @@ impl Task for ClosestInMesh<'_, '_> {
     }
 }
 
-struct ClosestInPatch<'a, 'v, 'p, 'w> {
-    builder: &'a mut Builder<'w>,
-    visit: &'v Visit<'p>,
-    root: Block<'v>,
-    of: PatchContext<'a>,
-    ray: &'a LatticeRay,
-    hit: &'a mut LatticeHit,
-}
-
-impl Task for ClosestInPatch<'_, '_, '_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) {
-        let Self { builder, visit, root, of, ray, hit } = self;
-        if !is_node(root.bytes()) {
-            PieceView::new(root.bytes()).closest(kernel, ray, of.patch, hit);
-            return;
-        }
-        let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
-        levels[0] = Some(Level::new(kernel, visit, root, ray, hit.t));
-        let mut depth = 0;
-        while let Some(level) = &mut levels[depth] {
-            let Some(lane) = level.hits.pop_nearest(hit.t) else {
-                if depth == 0 {
-                    break;
-                }
-                depth -= 1;
-                continue;
-            };
-            let (slot, cells) = level.child(lane);
-            if let Some(block) = visit.get(slot) {
-                builder.note_child(depth + 1, lane, block);
-                if is_node(block.bytes()) {
-                    depth += 1;
-                    levels[depth] = Some(Level::new(kernel, visit, block, ray, hit.t));
-                } else {
-                    PieceView::new(block.bytes()).closest(kernel, ray, of.patch, hit);
-                }
-            } else {
-                let block = builder.build(visit, slot, of, Some(cells));
-                builder.note_child(depth + 1, lane, block);
-                if is_node(block.bytes()) {
-                    depth += 1;
-                    levels[depth] = Some(kernel.enter(OpenLevel { visit, block, ray, t_max: hit.t }));
-                } else {
-                    kernel.enter(ClosestInPiece { block, patch: of.patch, ray, hit });
-                }
-            }
-        }
-    }
-}
-
 struct OccludedInMesh<'a, 'w> {
     tracer: &'a mut Intersector<'w>,
     mesh: MeshId,
@@ -410,110 +150,6 @@ impl Task for OccludedInMesh<'_, '_> {
     }
 }
 
-struct OccludedInPatch<'a, 'v, 'p, 'w> {
-    builder: &'a mut Builder<'w>,
-    visit: &'v Visit<'p>,
-    root: Block<'v>,
-    of: PatchContext<'a>,
-    ray: &'a LatticeRay,
-}
-
-impl Task for OccludedInPatch<'_, '_, '_, '_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> bool {
-        let Self { builder, visit, root, of, ray } = self;
-        if !is_node(root.bytes()) {
-            return PieceView::new(root.bytes()).occluded(kernel, ray, of.patch);
-        }
-        let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
-        levels[0] = Some(Level::new(kernel, visit, root, ray, ray.t_max()));
-        let mut depth = 0;
-        while let Some(level) = &mut levels[depth] {
-            let Some(lane) = level.hits.pop() else {
-                if depth == 0 {
-                    break;
-                }
-                depth -= 1;
-                continue;
-            };
-            let (slot, cells) = level.child(lane);
-            let is_hit = if let Some(block) = visit.get(slot) {
-                builder.note_child(depth + 1, lane, block);
-                if is_node(block.bytes()) {
-                    depth += 1;
-                    levels[depth] = Some(Level::new(kernel, visit, block, ray, ray.t_max()));
-                    continue;
-                }
-                PieceView::new(block.bytes()).occluded(kernel, ray, of.patch)
-            } else {
-                let block = builder.build(visit, slot, of, Some(cells));
-                builder.note_child(depth + 1, lane, block);
-                if is_node(block.bytes()) {
-                    depth += 1;
-                    levels[depth] = Some(kernel.enter(OpenLevel { visit, block, ray, t_max: ray.t_max() }));
-                    continue;
-                }
-                kernel.enter(OccludedInPiece { block, patch: of.patch, ray })
-            };
-            if is_hit {
-                return true;
-            }
-        }
-        false
-    }
-}
-
-// What is done with a block that was just built, apart from the code for blocks that are there.
-
-struct OpenLevel<'a, 'v, 'p> {
-    visit: &'v Visit<'p>,
-    block: Block<'v>,
-    ray: &'a LatticeRay,
-    t_max: f32,
-}
-
-impl<'v> Task for OpenLevel<'_, 'v, '_> {
-    type Output = Level<'v>;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> Level<'v> {
-        Level::new(kernel, self.visit, self.block, self.ray, self.t_max)
-    }
-}
-
-struct ClosestInPiece<'a, 'v> {
-    block: Block<'v>,
-    patch: PatchId,
-    ray: &'a LatticeRay,
-    hit: &'a mut LatticeHit,
-}
-
-impl Task for ClosestInPiece<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) {
-        PieceView::new(self.block.bytes()).closest(kernel, self.ray, self.patch, self.hit);
-    }
-}
-
-struct OccludedInPiece<'a, 'v> {
-    block: Block<'v>,
-    patch: PatchId,
-    ray: &'a LatticeRay,
-}
-
-impl Task for OccludedInPiece<'_, '_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> bool {
-        PieceView::new(self.block.bytes()).occluded(kernel, self.ray, self.patch)
-    }
-}
-
 /// A hit as the caller sees it, at the caller's `t`.
 #[inline(always)]
 fn hit_of(mesh: &WorldMesh, id: MeshId, t: f32, found: &LatticeHit) -> Hit {
@@ -547,7 +183,7 @@ impl<'w> Intersector<'w> {
             world,
             cache,
             pin,
-            builder: Builder { recorder: cache.trace().map(TraceLog::recorder), ..Default::default() },
+            builder: Builder::noting(cache.trace().map(TraceLog::recorder)),
             shading: Dicer::default(),
             stacks: Stacks::default(),
             order: BatchOrder::new(boxes.fold(DBounds::EMPTY, DBounds::union)),

@@ -4,6 +4,7 @@
 
 pub mod accel;
 mod batch;
+mod builder;
 pub mod camera;
 pub mod compile;
 pub mod costs;
@@ -12,6 +13,7 @@ mod entrance;
 pub mod intersect;
 pub mod light;
 pub mod material;
+mod patch_walk;
 pub mod rate;
 pub mod tessellate;
 pub mod world;

@@ -1,0 +1,194 @@
+//! Building a missing block: a patch's rates, then the vertices of a piece or the boxes of a node's children.
+
+use super::costs::BuildCosts;
+use super::world::{GridCache, WorldMesh};
+use crate::cache::{Block, BlockLayout, Claim, Recorder, Slot, Visit};
+use crate::grid::{CellRect, MAX_CELLS, NODE_BYTES, NodeView, PieceLayout, encode_node, is_node};
+use crate::ids::{MeshId, PatchId};
+use crate::math::{Bounds, LatticeGrid};
+use crate::subdiv::{Dicer, PatchRates};
+
+/// Children of a node along u and v.
+pub(super) const NODE_SIDE: u32 = 4;
+
+/// Quarters towards an irregular corner that a node's child boxes look into, below the child's own size.
+const CHILD_BOX_DEPTH: u32 = 3;
+
+/// Patches whose rates a builder remembers.
+const N_RATES: usize = 16;
+
+/// What building a block needs.
+#[derive(Default)]
+pub(super) struct Builder<'w> {
+    dicer: Dicer,
+    vertices: LatticeGrid,
+    boxes: Vec<Bounds>,
+    pub n_built: u64,
+    pub n_pieces: u64,
+    pub n_triangles: u64,
+    pub costs: BuildCosts,
+    /// Rates of the last patches, one for each remainder of patch numbers.
+    rates: [Option<(MeshId, PatchId, PatchRates)>; N_RATES],
+    /// Notes every block that is asked for, if the cache wants to know.
+    recorder: Option<Recorder<'w>>,
+}
+
+/// A patch about to be traversed.
+#[derive(Clone, Copy)]
+pub(super) struct PatchContext<'a> {
+    pub id: MeshId,
+    pub mesh: &'a WorldMesh,
+    pub patch: PatchId,
+}
+
+/// The side of a node's children in cells: 8, or as many times 4 that as leave at most 4 children a side.
+pub(super) fn child_side(cells: CellRect) -> u32 {
+    let longest = cells.size().into_iter().max().expect("two sides") as u32;
+    let mut side = MAX_CELLS as u32;
+    while longest > NODE_SIDE * side {
+        side *= NODE_SIDE;
+    }
+    side
+}
+
+/// Cells of child (a, b) of a node.
+pub(super) fn child_cells(parent: CellRect, side: u32, a: u32, b: u32) -> CellRect {
+    let (i0, j0) = (u32::from(parent.i0) + a * side, u32::from(parent.j0) + b * side);
+    CellRect {
+        i0: i0 as u16,
+        j0: j0 as u16,
+        i1: (i0 + side).min(u32::from(parent.i1)) as u16,
+        j1: (j0 + side).min(u32::from(parent.j1)) as u16,
+    }
+}
+
+impl<'w> Builder<'w> {
+    /// A builder that notes accesses with `recorder`, if there is one.
+    pub fn noting(recorder: Option<Recorder<'w>>) -> Self {
+        Self { recorder, ..Self::default() }
+    }
+
+    /// Builds the block over these cells, or over the whole patch.
+    #[cold]
+    #[inline(never)]
+    pub fn build<'v>(
+        &mut self,
+        visit: &'v Visit<'_>,
+        slot: Slot<'v>,
+        of: PatchContext<'_>,
+        cells: Option<CellRect>,
+    ) -> Block<'v> {
+        let ticket = match visit.claim(slot) {
+            Claim::Ready(block) => return block,
+            Claim::Build(ticket) => ticket,
+        };
+        self.n_built += 1;
+        self.costs.add(of.id, of.patch, 1);
+        let rates = self.rates(of);
+        let cells = cells.unwrap_or(CellRect { i0: 0, j0: 0, i1: rates.n_u as u16, j1: rates.n_v as u16 });
+        let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
+        if cells.size().iter().all(|&n| n <= MAX_CELLS) {
+            self.dicer.dice(of.mesh.surface(), of.patch, &rates, i, j, &mut self.vertices);
+            self.n_pieces += 1;
+            self.n_triangles += 2 * cells.size().iter().product::<usize>() as u64;
+            let layout = PieceLayout::new(&self.vertices, cells, [rates.n_u as u16, rates.n_v as u16]);
+            let vertices = &self.vertices;
+            return ticket
+                .publish(BlockLayout { bytes: layout.bytes(), children: 0 }, |out| layout.encode(vertices, out));
+        }
+        let children = self.child_boxes(of, &rates, cells);
+        let n_slots = (NODE_SIDE * u32::from(children[1] - 1)) as usize + usize::from(children[0]);
+        let boxes = &self.boxes;
+        ticket.publish(BlockLayout { bytes: NODE_BYTES, children: n_slots }, |out| {
+            encode_node(cells, children, boxes, out);
+        })
+    }
+
+    /// How finely a patch is diced: the same for its node and all its pieces.
+    fn rates(&mut self, of: PatchContext<'_>) -> PatchRates {
+        let remembered = &mut self.rates[of.patch.idx() % N_RATES];
+        match remembered {
+            Some((mesh, patch, rates)) if (*mesh, *patch) == (of.id, of.patch) => *rates,
+            _ => remembered.insert((of.id, of.patch, of.mesh.patch_rates(of.patch))).2,
+        }
+    }
+
+    /// Puts the boxes of a node's children into `self.boxes`; returns their number along u and v.
+    fn child_boxes(&mut self, of: PatchContext<'_>, rates: &PatchRates, cells: CellRect) -> [u8; 2] {
+        let side = child_side(cells);
+        let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
+        // A child's cells are a part of the patch: as many splits lead to a quarter of its size.
+        let depth = (rates.n_u.max(rates.n_v) / side).max(1).ilog2() + CHILD_BOX_DEPTH;
+        self.boxes.clear();
+        for b in 0..n_v {
+            for a in 0..n_u {
+                let c = child_cells(cells, side, a, b);
+                let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
+                let surface = of.mesh.surface();
+                self.boxes.push(match surface.edited().hide_cells(of.patch, rates, i, j) {
+                    true => Bounds::EMPTY,
+                    false => self.dicer.bounds(surface, of.patch, rates, i, j, depth),
+                });
+            }
+        }
+        [n_u as u8, n_v as u8]
+    }
+
+    /// Builds the block over these cells, or over the whole patch, and those below it, as far as they are missing.
+    pub fn complete<'v>(
+        &mut self,
+        visit: &'v Visit<'_>,
+        slot: Slot<'v>,
+        of: PatchContext<'_>,
+        cells: Option<CellRect>,
+    ) {
+        let block = visit.get(slot).unwrap_or_else(|| self.build(visit, slot, of, cells));
+        if !is_node(block.bytes()) {
+            return;
+        }
+        let cells = NodeView::new(block.bytes()).cells();
+        let side = child_side(cells);
+        let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
+        for (b, a) in (0..n_v).flat_map(|b| (0..n_u).map(move |a| (b, a))) {
+            let c = child_cells(cells, side, a, b);
+            let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
+            let surface = of.mesh.surface();
+            if !surface.edited().hide_cells(of.patch, &of.mesh.patch_rates(of.patch), i, j) {
+                self.complete(visit, block.child((b * NODE_SIDE + a) as usize), of, Some(c));
+            }
+        }
+    }
+
+    /// Builds the first block of a patch.
+    #[cold]
+    #[inline(never)]
+    pub fn build_root<'v>(
+        &mut self,
+        visit: &'v Visit<'_>,
+        slot: Slot<'v>,
+        of: PatchContext<'_>,
+        cache: &GridCache,
+        leaf_slot: u32,
+    ) -> Block<'v> {
+        cache.touch(of.id, leaf_slot);
+        self.build(visit, slot, of, None)
+    }
+
+    #[inline(always)]
+    pub fn note_root(&mut self, of: PatchContext<'_>, leaf_slot: u32, block: Block<'_>) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.root(name_of(of.id, leaf_slot), block);
+        }
+    }
+
+    #[inline(always)]
+    pub fn note_child(&mut self, level: usize, lane: usize, block: Block<'_>) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.child(level, lane, block);
+        }
+    }
+}
+/// One number for a slot of any mesh.
+fn name_of(mesh: MeshId, slot: u32) -> u64 {
+    u64::from(mesh.0) << 32 | u64::from(slot)
+}
