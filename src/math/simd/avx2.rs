@@ -149,25 +149,6 @@ impl Kernel for Avx2 {
         in_registers!(_mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a, b)) as u32)
     }
     #[inline(always)]
-    fn transposed_integers(self, x: [__m256d; 4]) -> [[i32; 4]; 3] {
-        // SAFETY: `self` proves AVX2; only `out` is written, 16 bytes to each of its rows.
-        unsafe {
-            let [a, b, c, d] = [
-                _mm256_cvttpd_epi32(x[0]),
-                _mm256_cvttpd_epi32(x[1]),
-                _mm256_cvttpd_epi32(x[2]),
-                _mm256_cvttpd_epi32(x[3]),
-            ];
-            let (ab, cd) = (_mm_unpacklo_epi32(a, b), _mm_unpacklo_epi32(c, d));
-            let (ab_high, cd_high) = (_mm_unpackhi_epi32(a, b), _mm_unpackhi_epi32(c, d));
-            let mut out = [[0; 4]; 3];
-            _mm_storeu_si128(out[0].as_mut_ptr().cast(), _mm_unpacklo_epi64(ab, cd));
-            _mm_storeu_si128(out[1].as_mut_ptr().cast(), _mm_unpackhi_epi64(ab, cd));
-            _mm_storeu_si128(out[2].as_mut_ptr().cast(), _mm_unpacklo_epi64(ab_high, cd_high));
-            out
-        }
-    }
-    #[inline(always)]
     fn nearest4(self, x: __m256d) -> [i32; 4] {
         let mut out = [0; 4];
         // SAFETY: `self` proves AVX2; `out` is 16 writable bytes and the store needs no alignment. Rounding is to nearest,

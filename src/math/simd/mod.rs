@@ -81,9 +81,6 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn floor4(self, x: Self::D) -> Self::D;
     /// Bit k is set where `a < b` in lane k.
     fn lt4(self, a: Self::D, b: Self::D) -> u32;
-    /// Lanes 0, 1 and 2 of four lists of whole numbers below 2^31 in magnitude: first all lanes 0, then all lanes 1, then all
-    /// lanes 2.
-    fn transposed_integers(self, x: [Self::D; 4]) -> [[i32; 4]; 3];
     /// The nearest integers, the even one of two; numbers are below 2^31 in magnitude.
     fn nearest4(self, x: Self::D) -> [i32; 4];
     /// Lane i of list k becomes lane k of list i.

@@ -130,10 +130,6 @@ impl Kernel for Portable {
         (0..4).fold(0, |m, k| m | (u32::from(a[k] < b[k]) << k))
     }
     #[inline(always)]
-    fn transposed_integers(self, x: [[f64; 4]; 4]) -> [[i32; 4]; 3] {
-        from_fn(|axis| from_fn(|i| x[i][axis] as i32))
-    }
-    #[inline(always)]
     fn nearest4(self, x: [f64; 4]) -> [i32; 4] {
         x.map(|x| x.round_ties_even() as i32)
     }

@@ -71,23 +71,13 @@ impl Task for RoundOfDoubles {
             k.max4(a, b),
             k.floor4(a),
         ];
-        let whole = |i: u32| k.floor4(k.splat4(f64::from(self.0) * 7.3 - f64::from(i) * 1e5));
-        let integers = k.transposed_integers([whole(0), whole(1), a_point(k, self.0), whole(2)]);
         let canonical = |x: f64| if x.is_nan() { f64::NAN.to_bits() } else { x.to_bits() };
         let doubles = doubles.into_iter().chain(k.transpose4([a, b, k.floor4(a), k.splat4(7.0)]));
-        let integers = integers
-            .into_iter()
-            .chain([k.nearest4(whole(3)), k.nearest4(k.load4(&[0.5, 1.5, -2.5, 2.5 + f64::from(self.0)]))]);
+        let whole = k.floor4(k.splat4(f64::from(self.0) * 7.3 - 3e5));
+        let integers = [k.nearest4(whole), k.nearest4(k.load4(&[0.5, 1.5, -2.5, 2.5 + f64::from(self.0)]))];
         let lanes = doubles.flat_map(|d| k.store4(d).map(canonical));
-        lanes.chain(integers.flatten().map(|i| i as u64)).chain([u64::from(k.lt4(a, b))]).collect()
+        lanes.chain(integers.into_iter().flatten().map(|i| i as u64)).chain([u64::from(k.lt4(a, b))]).collect()
     }
-}
-
-/// Three different whole numbers.
-#[inline(always)]
-fn a_point<K: Kernel>(k: K, seed: u32) -> K::D {
-    let seed = f64::from(seed);
-    k.load4(&[seed - 16_777_216.0, 16_777_216.0 - seed, -seed, 0.0])
 }
 
 #[test]
