@@ -56,7 +56,8 @@ impl Parts {
 
     /// The ring of the patch.
     pub fn ring(&self, library: &PlanLibrary) -> &[Point] {
-        &self.points[..library.n_points(self.parts[0].node)]
+        let n = library.n_points(self.parts[0].node);
+        &self.points[..n]
     }
 
     /// The node of a part.
