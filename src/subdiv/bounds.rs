@@ -122,11 +122,11 @@ impl Evaluator {
                 let n = library.n_points(node);
                 self.points[ring..ring + n].iter().for_each(|p| bounds.grow(p.to_vec()));
             }
-            Plan::Split { rows, children, .. } => {
+            Plan::Split { step, children, .. } => {
                 let start = self.points.len();
                 let is_in_one_half = |range| half_range(range, 0.0).is_some() != half_range(range, 1.0).is_some();
                 let is_alone = is_in_one_half(u) && is_in_one_half(v);
-                let refined = if is_alone { None } else { Some(self.refine(library, rows, ring)) };
+                let refined = if is_alone { None } else { Some(self.refine(library, step, ring)) };
                 let mark = self.points.len();
                 for k in 0..4 {
                     let (x, y) = quarter(k);
@@ -134,7 +134,7 @@ impl Evaluator {
                     let child = &children.get(k);
                     let child_ring = match refined {
                         Some(refined) => self.push_child(library, child, refined),
-                        None => self.refine_child(library, rows, child, ring),
+                        None => self.refine_child(library, step, child, ring),
                     };
                     self.bound(library, child.node, child_ring, u, v, depth.saturating_sub(1), bounds);
                     self.points.truncate(mark);

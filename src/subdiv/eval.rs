@@ -2,8 +2,8 @@
 
 use super::bounds::HullWeights;
 use super::parts::Parts;
-use super::plan::{Child, Children, Limit, Limits, NodeId, Plan, PlanLibrary};
-use super::products::{child_points, control_points, one_product, products};
+use super::plan::{Child, Children, Limit, Limits, NodeId, Plan, PlanLibrary, Step};
+use super::products::{child_points, control_points, one_product, refined_points};
 use super::regular::{self, Basis, ControlPoints};
 use super::rows::SparseRows;
 use crate::math::PointGrid;
@@ -237,12 +237,12 @@ impl Evaluator {
         target: Target,
         out: &mut PointGrid,
     ) {
-        let (rows, children, limits) = match library.plan(node) {
+        let (step, children, limits) = match library.plan(node) {
             Plan::Regular(rows, turn) => {
                 let control = control_points(library.rows(), rows, turn, &self.points[ring..]);
                 return self.regular(&control, target, out);
             }
-            Plan::Split { rows, children, limits, .. } => (rows, children, limits),
+            Plan::Split { step, children, limits, .. } => (step, children, limits),
         };
         if target.is_single() || depth >= MAX_DEPTH {
             let (u, v) = (self.params[target.us.0], self.params[target.vs.0]);
@@ -256,14 +256,14 @@ impl Evaluator {
         let middle = self.middle(&target);
         let quarters = quarters_of(&target, middle);
         let start = self.points.len();
-        let refined = if quarters.count_ones() > 1 { Some(self.refine(library, rows, ring)) } else { None };
+        let refined = if quarters.count_ones() > 1 { Some(self.refine(library, step, ring)) } else { None };
         let marks = (self.points.len(), self.params.len());
         for k in LEFT_FIRST.into_iter().filter(|k| quarters >> k & 1 == 1) {
             let child = &children.get(k);
             let part = self.quarter_target(&target, middle, k);
             let child_ring = match refined {
                 Some(refined) => self.push_child(library, child, refined),
-                None => self.refine_child(library, rows, child, ring),
+                None => self.refine_child(library, step, child, ring),
             };
             self.walk(library, child.node, child_ring, depth + 1, part, out);
             self.points.truncate(marks.0);
@@ -332,11 +332,11 @@ impl Evaluator {
     }
 
     /// Pushes the refined points; returns where they start.
-    pub(super) fn refine(&mut self, library: &PlanLibrary, rows: SparseRows, ring: usize) -> usize {
+    pub(super) fn refine(&mut self, library: &PlanLibrary, step: Step, ring: usize) -> usize {
         let start = self.points.len();
-        self.points.resize(start + rows.len(), Point::ZERO);
+        self.points.resize(start + step.rows.len(), Point::ZERO);
         let (points, out) = self.points.split_at_mut(start);
-        products(library.rows(), rows, &points[ring..], out);
+        refined_points(library.rows(), step, &points[ring..], out);
         start
     }
 
@@ -350,17 +350,15 @@ impl Evaluator {
     }
 
     /// Pushes the ring of the only child that is wanted; returns where it starts.
-    pub(super) fn refine_child(
-        &mut self,
-        library: &PlanLibrary,
-        rows: SparseRows,
-        child: &Child,
-        ring: usize,
-    ) -> usize {
+    pub(super) fn refine_child(&mut self, library: &PlanLibrary, step: Step, child: &Child, ring: usize) -> usize {
+        if step.pole.is_some() {
+            let refined = self.refine(library, step, ring);
+            return self.push_child(library, child, refined);
+        }
         let start = self.points.len();
         self.points.resize(start + child.points.len(), Point::ZERO);
         let (points, out) = self.points.split_at_mut(start);
-        child_points(library.rows(), rows, child, &points[ring..], out);
+        child_points(library.rows(), step, child, &points[ring..], out);
         start
     }
 
@@ -407,7 +405,7 @@ impl Evaluator {
                     let control = control_points(library.rows(), rows, turn, &self.points[ring..]);
                     return found_at(regular_sample(&control, u, v, scale), position);
                 }
-                Plan::Split { rows, children, limits, .. } => {
+                Plan::Split { step, children, limits, .. } => {
                     let corner =
                         if depth < MAX_DEPTH { exact_corner(u, v) } else { exact_corner(u.round(), v.round()) };
                     let limit = corner.and_then(|k| limits.get(k));
@@ -422,7 +420,7 @@ impl Evaluator {
                     let (x, y) = (f64::from(u8::from(u >= 0.5)), f64::from(u8::from(v >= 0.5)));
                     let k = exact_corner(x, y).expect("halves are corners");
                     let child = children.get(k);
-                    ring = self.refine_child(library, rows, &child, ring);
+                    ring = self.refine_child(library, step, &child, ring);
                     node = child.node;
                     (u, v) = (2.0 * u - x, 2.0 * v - y);
                     scale *= 2.0;
@@ -455,7 +453,7 @@ impl Evaluator {
 
 fn polygon(library: &PlanLibrary, node: NodeId) -> (SparseRows, Children<'_>) {
     match library.plan(node) {
-        Plan::Split { rows, children, .. } => (rows, children),
+        Plan::Split { step, children, .. } => (step.rows, children),
         Plan::Regular(..) => unreachable!("a polygon is never regular"),
     }
 }

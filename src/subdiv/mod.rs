@@ -31,6 +31,7 @@ pub mod eval;
 pub mod local;
 mod parts;
 pub mod plan;
+mod pole;
 mod products;
 pub mod refine;
 pub mod regular;

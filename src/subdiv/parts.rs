@@ -4,8 +4,8 @@
 //! has found stays as long as the patch is remembered, and the next one starts from there.
 
 use super::eval::Point;
-use super::plan::{NodeId, Plan, PlanLibrary};
-use super::products::{control_points, products};
+use super::plan::{Child, NodeId, Plan, PlanLibrary};
+use super::products::{control_points, listed_control, refined_points};
 use super::regular::ControlPoints;
 
 /// Parts that are kept. A corner needs four a level, a crease four times as many on each level; what is beyond is found
@@ -18,7 +18,7 @@ pub(super) struct Parts {
     /// The ring of the patch, then points of parts.
     points: Vec<Point>,
     parts: Vec<Part>,
-    /// Refined points of the part that is split, and then the ring of a quarter that is regular.
+    /// Refined points of the part that is split.
     scratch: Vec<Point>,
 }
 
@@ -87,32 +87,39 @@ impl Parts {
     }
 
     fn split(&mut self, library: &PlanLibrary, part: usize) -> usize {
-        let Plan::Split { rows, children, .. } = library.plan(self.parts[part].node) else {
+        let Plan::Split { step, children, .. } = library.plan(self.parts[part].node) else {
             unreachable!("a regular part is not split")
         };
-        let store = library.rows();
-        self.scratch.resize(rows.len(), Point::ZERO);
+        self.scratch.resize(step.rows.len(), Point::ZERO);
         let Part { first, n_points, .. } = self.parts[part];
-        products(store, rows, &self.points[first as usize..][..n_points as usize], &mut self.scratch);
+        refined_points(library.rows(), step, &self.points[first as usize..][..n_points as usize], &mut self.scratch);
         let quarters = self.parts.len();
         self.parts[part].quarters = quarters as u32;
         for child in (0..4).map(|k| children.get(k)) {
-            let first = self.points.len();
-            let plan = library.plan(child.node);
-            if let Plan::Regular(rows_of_child, turn) = plan {
-                let n = rows.len();
-                self.scratch.resize(n + child.points.len(), Point::ZERO);
-                let (refined, ring) = self.scratch.split_at_mut(n);
-                store.gather(child.points, refined, ring);
-                self.points.extend(control_points(store, rows_of_child, turn, ring));
-            } else {
-                self.points.resize(first + child.points.len(), Point::ZERO);
-                store.gather(child.points, &self.scratch, &mut self.points[first..]);
-            }
-            let n_points = (self.points.len() - first) as u32;
-            let is_regular = matches!(plan, Plan::Regular(..));
-            self.parts.push(Part { node: child.node, first: first as u32, n_points, is_regular, quarters: 0 });
+            let part = self.push_quarter(library, &child);
+            self.parts.push(part);
         }
         quarters
+    }
+
+    /// Pushes the points of a quarter; those of the whole are in `scratch`.
+    fn push_quarter(&mut self, library: &PlanLibrary, child: &Child) -> Part {
+        let first = self.points.len();
+        let (store, plan) = (library.rows(), library.plan(child.node));
+        match plan {
+            Plan::Regular(rows, turn) if rows.is_empty() => {
+                self.points.extend_from_slice(&listed_control(store, child.points, turn, &self.scratch));
+            }
+            Plan::Regular(rows, turn) => {
+                store.gather_to(child.points, &self.scratch, &mut self.points);
+                let control = control_points(store, rows, turn, &self.points[first..]);
+                self.points.truncate(first);
+                self.points.extend_from_slice(&control);
+            }
+            Plan::Split { .. } => store.gather_to(child.points, &self.scratch, &mut self.points),
+        }
+        let n_points = (self.points.len() - first) as u32;
+        let is_regular = matches!(plan, Plan::Regular(..));
+        Part { node: child.node, first: first as u32, n_points, is_regular, quarters: 0 }
     }
 }

@@ -1,6 +1,7 @@
 //! The plan library: one node per distinct ring, shared by all faces, levels and meshes with the same rules.
 
 use super::local::{LocalMesh, RingWalker};
+use super::pole::Pole;
 use super::rows::{RowStore, Span, SparseRows};
 use super::rules::{self, CornerLimit, Origin, RefinedView, Row, RuleSet};
 use crate::mesh::CreaseMethod;
@@ -69,16 +70,26 @@ impl Limit {
     }
 }
 
+/// One Catmull-Clark step of a ring.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// The refined points that children use. A polygon's first row is its face point, and the others count that as one more
+    /// ring point.
+    pub rows: SparseRows,
+    /// If the ring is a pole, its points in a pole's order, and the rows are in the order of its step.
+    pub pole: Option<Span>,
+}
+
 /// How the surface over a ring is found.
 #[derive(Clone, Copy, Debug)]
 pub enum Plan<'a> {
-    /// Bicubic B-spline: 16 rows give the control points, u fastest, of the face from the corner that is the turn.
+    /// Bicubic B-spline: 16 rows give the control points, u fastest, of the face from the corner that is the turn; if there
+    /// is no row, the points are the control points.
     Regular(SparseRows, u32),
     /// One Catmull-Clark step, then the quarters (a polygon of n sides has n children).
     Split {
-        /// The refined points that children use. A polygon's first row is its face point, and the others count that as
-        /// one more ring point.
-        rows: SparseRows,
+        /// Gives the refined points.
+        step: Step,
         /// One child per corner. Quarters of quads keep the quad's orientation; children of polygons start at their corner.
         children: Children<'a>,
         /// Limits at the corners; none for polygons, of which only the children are evaluated.
@@ -134,6 +145,8 @@ fn unturned(k: usize, turn: u32) -> usize {
 struct Node {
     n_points: u32,
     rows: SparseRows,
+    /// See [`Step::pole`]; nothing if the ring is none.
+    pole: Span,
     /// Where its children start, and how many there are: 0 for regular nodes, [`NONE`] as long as it is being made.
     children: u32,
     n_children: u32,
@@ -151,6 +164,8 @@ pub struct PlanLibrary {
     children: Vec<Child>,
     limits: Vec<Limit>,
     by_key: FxHashMap<Vec<u32>, NodeId>,
+    /// The node whose ring points are its control points.
+    plain: Option<NodeId>,
     /// Scratch.
     key: Vec<u32>,
     walker: RingWalker,
@@ -166,6 +181,7 @@ impl PlanLibrary {
             children: Vec::new(),
             limits: Vec::new(),
             by_key: FxHashMap::default(),
+            plain: None,
             key: Vec::new(),
             walker: RingWalker::default(),
         }
@@ -198,7 +214,8 @@ impl PlanLibrary {
         let n_limits = if children.len() == 4 { 4 } else { 0 };
         let limits = &self.limits[node.limits as usize..][..n_limits];
         let (children, limits) = (Children { all: children, turn }, Limits { all: limits, turn });
-        Plan::Split { rows: node.rows, children, limits, in_hull: node.in_hull }
+        let pole = (!node.pole.is_empty()).then_some(node.pole);
+        Plan::Split { step: Step { rows: node.rows, pole }, children, limits, in_hull: node.in_hull }
     }
 
     /// The rows of all nodes.
@@ -254,7 +271,8 @@ impl PlanLibrary {
         let id = NodeId::unturned(self.nodes.len());
         let nothing = self.rows.push([]);
         let n_points = ring.n_vertices() as u32;
-        self.nodes.push(Node { n_points, rows: nothing, children: 0, n_children: NONE, limits: 0, in_hull: true });
+        let pole = self.rows.push_indices(&[]);
+        self.nodes.push(Node { n_points, rows: nothing, pole, children: 0, n_children: NONE, limits: 0, in_hull: true });
         self.by_key.insert(key.to_vec(), id);
         let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
         match regular {
@@ -269,13 +287,14 @@ impl PlanLibrary {
 
     fn split(&mut self, id: NodeId, ring: &LocalMesh) {
         let n = ring.n_corners();
-        let (rows, quarters) = self.quarters(ring);
+        let (rows, quarters, pole) = self.quarters(ring);
         let rows = self.rows.push(&rows);
+        self.nodes[id.index()].pole = self.rows.push_indices(&pole);
         let children: Vec<Child> = quarters
             .into_iter()
             .map(|Quarter { node, turn, points }| {
-                let node = node.unwrap_or_else(|ring| self.node(&ring));
-                Child { node: node.turned(turn), points: self.rows.push_indices(&points) }
+                let node = node.unwrap_or_else(|ring| self.node(&ring)).turned(turn);
+                self.plain_child(node, &points).unwrap_or_else(|| Child { node, points: self.rows.push_indices(&points) })
             })
             .collect();
         let n_limits = if n == 4 { 4 } else { 0 };
@@ -290,15 +309,44 @@ impl PlanLibrary {
         self.limits.extend(limits);
     }
 
+    /// The child at a regular node whose control points are points of its ring: those are all the points it has then.
+    fn plain_child(&mut self, node: NodeId, points: &[u32]) -> Option<Child> {
+        let (Node { rows, n_children: 0, .. }, turn) = (self.nodes[node.index()], node.turn()) else { return None };
+        let row = |i: usize| self.rows.row(rows, i);
+        let is_plain = (0..rows.len()).all(|i| matches!(row(i)[..], [(_, 1.0)]));
+        if !is_plain || rows.is_empty() {
+            return None;
+        }
+        let control = TURNED_CONTROL[turn as usize].map(|i| points[row(i.into())[0].0 as usize]);
+        let points = self.rows.push_indices(&control);
+        let node = self.plain.unwrap_or_else(|| self.push_plain());
+        self.plain = Some(node);
+        Some(Child { node, points })
+    }
+
+    fn push_plain(&mut self) -> NodeId {
+        let id = NodeId::unturned(self.nodes.len());
+        let (rows, pole) = (self.rows.push([]), self.rows.push_indices(&[]));
+        self.nodes.push(Node { n_points: 16, rows, pole, children: 0, n_children: 0, limits: 0, in_hull: true });
+        id
+    }
+
     /// Rows of the refined points that any quarter uses, and each quarter: its node, or its ring if that is new, and its
-    /// points in terms of those rows.
-    fn quarters(&mut self, ring: &LocalMesh) -> (Vec<Row>, Vec<Quarter>) {
+    /// points in terms of those rows; and the ring in a pole's order, if it is one.
+    fn quarters(&mut self, ring: &LocalMesh) -> (Vec<Row>, Vec<Quarter>, Vec<u32>) {
         let refined = RefinedView::new(self.rules, ring);
         let mut rows =
             RefinedRows { rules: self.rules, ring, place: vec![NONE; refined.origin.len()], rows: Vec::new() };
         let n = ring.n_corners();
         if n != 4 {
             rows.place_of(&refined, refined.face_vertex(0));
+        }
+        let mut pole_ring = Vec::new();
+        if let Some(pole) = Pole::new(ring)
+            && let Some(points) = pole.refined(&refined)
+        {
+            points.into_iter().for_each(|v| _ = rows.place_of(&refined, v));
+            pole_ring = pole.ring();
         }
         let (mut walker, mut key) = (std::mem::take(&mut self.walker), Vec::new());
         let quarters = (0..n).map(|k| {
@@ -309,7 +357,7 @@ impl PlanLibrary {
         });
         let quarters = quarters.collect();
         self.walker = walker;
-        (rows.rows, quarters)
+        (rows.rows, quarters, pole_ring)
     }
 
     fn limit(&mut self, id: NodeId, ring: &LocalMesh, rows: SparseRows, child: &Child, k: u32) -> Limit {
@@ -375,6 +423,15 @@ impl PlanLibrary {
         self.rows.push([&row])
     }
 }
+
+/// For each control point of a face, which one it is of a node that starts at the face's corner `turn`: the node's u runs
+/// from there to the next corner.
+pub(super) const TURNED_CONTROL: [[u8; 16]; 4] = [
+    [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15],
+    [12, 8, 4, 0, 13, 9, 5, 1, 14, 10, 6, 2, 15, 11, 7, 3],
+    [15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0],
+    [3, 7, 11, 15, 2, 6, 10, 14, 1, 5, 9, 13, 0, 4, 8, 12],
+];
 
 /// A quarter that is becoming a child.
 struct Quarter {

@@ -1,9 +1,10 @@
 //! Sparse rows times points: how ring points become refined points, control points and limits.
 
 use super::eval::Point;
-use super::plan::Child;
+use super::plan::{Child, Step, TURNED_CONTROL};
+use super::pole::PoleStep;
 use super::regular::ControlPoints;
-use super::rows::{Index, RowStore, RowsView, SparseRows, with_rows};
+use super::rows::{Index, RowStore, RowsView, SparseRows, Span, Width, with_rows};
 use crate::math::simd::{self, Kernel, Task};
 
 /// A row times points. Two sums, of the even and of the odd terms, keep the adder busy.
@@ -62,9 +63,19 @@ pub(super) fn products(store: &RowStore, rows: SparseRows, points: &[Point], out
     });
 }
 
-/// The ring points of a child: `out` is as long as its ring.
-pub(super) fn child_points(store: &RowStore, rows: SparseRows, child: &Child, points: &[Point], out: &mut [Point]) {
-    with_rows!(store, rows, |view, indices| {
+/// The refined points of a ring: `out` has one for each row of the step.
+pub(super) fn refined_points(store: &RowStore, step: Step, points: &[Point], out: &mut [Point]) {
+    let Some(pole) = step.pole else { return products(store, step.rows, points, out) };
+    match store.widths() {
+        Width::Narrow(indices) => simd::run(PoleStep { points, ring: store.list(pole, indices), out }),
+        Width::Wide(indices) => simd::run(PoleStep { points, ring: store.list(pole, indices), out }),
+    }
+}
+
+/// The ring points of one child alone: `out` is as long as its ring. `step` is none of a pole.
+pub(super) fn child_points(store: &RowStore, step: Step, child: &Child, points: &[Point], out: &mut [Point]) {
+    debug_assert!(step.pole.is_none(), "a pole's points are found together");
+    with_rows!(store, step.rows, |view, indices| {
         let which = Which::Listed(store.list(child.points, indices));
         simd::run(Products { rows: view, points, which, out });
     });
@@ -77,19 +88,26 @@ pub(super) fn one_product(store: &RowStore, rows: SparseRows, i: usize, points: 
 
 /// The control points of a regular node, as a face has them that is turned.
 pub(super) fn control_points(store: &RowStore, rows: SparseRows, turn: u32, points: &[Point]) -> ControlPoints {
+    let places = &TURNED_CONTROL[turn as usize];
+    if rows.is_empty() {
+        return places.map(|i| points[usize::from(i)]);
+    }
     let mut control = [Point::ZERO; 16];
     products(store, rows, points, &mut control);
-    if turn == 0 {
-        return control;
+    if turn == 0 { control } else { places.map(|i| control[usize::from(i)]) }
+}
+
+/// As [`control_points`] of a child without rows; `refined` are its parent's.
+pub(super) fn listed_control(store: &RowStore, list: Span, turn: u32, refined: &[Point]) -> ControlPoints {
+    let places = &TURNED_CONTROL[turn as usize];
+    match store.widths() {
+        Width::Narrow(indices) => copy_turned(places, store.list(list, indices), refined),
+        Width::Wide(indices) => copy_turned(places, store.list(list, indices), refined),
     }
-    // The node's u runs from the face's corner `turn` to the next one.
-    std::array::from_fn(|place| {
-        let (i, j) = (place % 4, place / 4);
-        let (a, b) = match turn {
-            1 => (j, 3 - i),
-            2 => (3 - i, 3 - j),
-            _ => (3 - j, i),
-        };
-        control[4 * b + a]
-    })
+}
+
+#[inline(always)]
+fn copy_turned<I: Index>(places: &[u8; 16], list: &[I], refined: &[Point]) -> ControlPoints {
+    let list: &[I; 16] = list.first_chunk().expect("16 control points");
+    places.map(|i| refined[list[usize::from(i)].idx()])
 }

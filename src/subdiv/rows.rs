@@ -309,6 +309,15 @@ impl RowStore {
         }
     }
 
+    /// Appends the listed ones of `from`.
+    #[inline]
+    pub(super) fn gather_to<T: Copy>(&self, list: Span, from: &[T], to: &mut Vec<T>) {
+        match self.widths() {
+            Width::Narrow(indices) => to.extend(self.list(list, indices).iter().map(|i| from[i.idx()])),
+            Width::Wide(indices) => to.extend(self.list(list, indices).iter().map(|i| from[i.idx()])),
+        }
+    }
+
     /// Drops what only adding needs.
     pub fn seal(&mut self) {
         (self.known_rows, self.known_masks, self.known_lists) = Default::default();

@@ -1,0 +1,238 @@
+//! One Catmull-Clark step around a lone extraordinary vertex, written out: what most splits of irregular patches are.
+//!
+//! A **pole** is a quad with smooth corners in a ring of quads, one corner of which, the **apex**, has n != 4 edges. Its
+//! quarter at the apex is a pole of the same n, the other three are regular. As rows the step is about 150 terms, each with
+//! a column and a weight to be read; written out it is 130 sums of registers.
+//!
+//! The points of a pole, for n = 5, with the face between A, e0, f0 and e1:
+//!
+//! ```text
+//!    p7 -- p6 -- p5 -- p4        ring: A, e0, f0, e1, f1, .. e(n-1), f(n-1), then p1 to p7
+//!     |     |     |     |        step: the ring of the quarter at A in the same order, then the nine refined points
+//!    f1 -- e1 -- f0 -- p3              beyond it: those on the sides from (3, -1) to (3, 3) and on to (-1, 3), in half
+//!   e2 |    |     |     |              edges from A
+//!     \ -- A -- e0 -- p2
+//!    f2 / \     |     |
+//!      e3  e4 - f4 -- p1
+//! ```
+
+use super::eval::Point;
+use super::local::LocalMesh;
+use super::rows::Index;
+use super::rules::RefinedView;
+use crate::math::simd::{Kernel, Task};
+use crate::topology::{HalfEdges, VertexTags};
+
+/// Points of a ring beside the apex and its fan.
+const N_OUTER: usize = 7;
+
+/// Refined points that the quarter at the apex does not have.
+const N_BEYOND: usize = 9;
+
+/// The half-edges of a pole from which all its points can be told.
+pub(super) struct Pole<'a> {
+    ring: &'a LocalMesh,
+    /// Half-edges from the apex, counter-clockwise from the face's.
+    spokes: Vec<u32>,
+    /// Half-edges of the face, from the apex on.
+    sides: [u32; 4],
+    /// Half-edges of the five faces beyond, each from the face's corner that it touches: below right, right, above right,
+    /// above, above left.
+    beyond: [u32; 5],
+}
+
+impl<'a> Pole<'a> {
+    /// The pole that a ring is, if it is one.
+    pub fn new(ring: &'a LocalMesh) -> Option<Self> {
+        let is_smooth = ring.all_quads() && ring.fins.is_empty() && ring.tags.iter().all(|t| *t == VertexTags::default());
+        if !is_smooth || ring.n_corners() != 4 {
+            return None;
+        }
+        let sizes = [0, 1, 2, 3].map(|k| ring.fan_size(k));
+        let apex = (0..4u32).find(|&k| sizes[k as usize].0 != 4)?;
+        let is_pole = (0..4).all(|k| sizes[k].1 && (k == apex as usize) == (sizes[k].0 != 4)) && sizes[apex as usize].0 > 2;
+        is_pole.then(|| Self::at(ring, apex))
+    }
+
+    fn at(ring: &'a LocalMesh, apex: u32) -> Self {
+        let next = |h: u32, n: usize| (0..n).fold(h, |h, _| ring.next(h));
+        let sides = [0, 1, 2, 3].map(|k| next(apex, k));
+        let right = ring.next(ring.twin(sides[1]));
+        let above = ring.twin(sides[2]);
+        let beyond = [
+            ring.next(ring.twin(right)),
+            right,
+            ring.twin(next(right, 2)),
+            above,
+            ring.twin(next(above, 3)),
+        ];
+        Self { ring, spokes: ring.fan(apex).spokes, sides, beyond }
+    }
+
+    /// The vertices of the ring, in a pole's order.
+    pub fn ring(&self) -> Vec<u32> {
+        let ring = self.ring;
+        let at = |h: u32, n: usize| ring.vertex((0..n).fold(h, |h, _| ring.next(h)));
+        let [below, right, corner, above, left] = self.beyond;
+        let fan = self.spokes.iter().flat_map(|&spoke| [at(spoke, 1), at(spoke, 2)]);
+        let outer = [at(below, 2), at(right, 1), at(right, 2), at(corner, 2), at(corner, 3), at(above, 3), at(left, 2)];
+        std::iter::once(at(self.sides[0], 0)).chain(fan).chain(outer).collect()
+    }
+
+    /// The refined vertices, in the order of [`PoleStep`]; `None` if some of them are the same.
+    pub fn refined(&self, view: &RefinedView<'_>) -> Option<Vec<u32>> {
+        let (vertex, edge, face) = (|h: u32| view.vertex(4 * h), |h: u32| view.vertex(4 * h + 1), |h: u32| view.vertex(4 * h + 2));
+        let before = |h: u32| self.ring.prev(h);
+        let [_, side, top, last] = self.sides;
+        let [below, right, corner, above, left] = self.beyond;
+        let mut out = vec![vertex(self.sides[0])];
+        out.extend(self.spokes.iter().flat_map(|&spoke| [edge(spoke), face(spoke)]));
+        out.extend([edge(below), vertex(side), edge(side), vertex(top), edge(top), vertex(last), edge(before(left))]);
+        out.extend([face(below), edge(right), face(right), edge(corner), face(corner), edge(before(corner))]);
+        out.extend([face(above), edge(before(above)), face(left)]);
+        let mut sorted = out.clone();
+        sorted.sort_unstable();
+        sorted.dedup();
+        (sorted.len() == out.len()).then_some(out)
+    }
+}
+
+/// The refined points of a pole: `out` has nine more than the ring.
+pub(super) struct PoleStep<'a, I> {
+    pub points: &'a [Point],
+    /// Which of them is which of the ring, in a pole's order.
+    pub ring: &'a [I],
+    pub out: &'a mut [Point],
+}
+
+/// A quarter of a sum: a face point, or an edge point if two are face points.
+#[inline(always)]
+fn mean<K: Kernel>(k: K, a: K::D, b: K::D, c: K::D, d: K::D) -> K::D {
+    k.mul4(k.add4(k.add4(a, b), k.add4(c, d)), k.splat4(0.25))
+}
+
+/// The vertex point of a vertex of four edges.
+#[inline(always)]
+fn vertex_point<K: Kernel>(k: K, p: K::D, edges: [K::D; 4], faces: [K::D; 4]) -> K::D {
+    let edges = k.add4(k.add4(edges[0], edges[1]), k.add4(edges[2], edges[3]));
+    let faces = k.add4(k.add4(faces[0], faces[1]), k.add4(faces[2], faces[3]));
+    k.add4(k.mul4(p, k.splat4(0.5)), k.mul4(k.add4(edges, faces), k.splat4(1.0 / 16.0)))
+}
+
+impl<I: Index> PoleStep<'_, I> {
+    /// Point `i` of the ring.
+    #[inline(always)]
+    fn at<K: Kernel>(&self, k: K, i: usize) -> K::D {
+        k.load4(&self.points[self.ring[i].idx()].0)
+    }
+
+    #[inline(always)]
+    fn set<K: Kernel>(&mut self, k: K, i: usize, p: K::D) {
+        self.out[i].0 = k.store4(p);
+    }
+
+    /// The points that come of the apex and its fan of `n` faces.
+    #[inline(always)]
+    fn fan<K: Kernel>(&mut self, k: K, n: usize) {
+        let apex = self.at(k, 0);
+        let first = self.at(k, 1);
+        let (mut edge, mut edges, mut faces) = (first, k.splat4(0.0), k.splat4(0.0));
+        for i in 0..n {
+            let next = if i + 1 < n { self.at(k, 2 * i + 3) } else { first };
+            let face = mean(k, apex, edge, self.at(k, 2 * i + 2), next);
+            self.set(k, 2 * i + 2, face);
+            (edges, faces) = (k.add4(edges, edge), k.add4(faces, face));
+            edge = next;
+        }
+        let mut before = k.load4(&self.out[2 * n].0);
+        for i in 0..n {
+            let face = k.load4(&self.out[2 * i + 2].0);
+            let point = mean(k, apex, self.at(k, 2 * i + 1), before, face);
+            self.set(k, 2 * i + 1, point);
+            before = face;
+        }
+        let n = n as f64;
+        let sum = k.mul4(k.add4(edges, faces), k.splat4(1.0 / (n * n)));
+        self.set(k, 0, k.add4(k.mul4(apex, k.splat4((n - 2.0) / n)), sum));
+    }
+
+    /// The others.
+    #[inline(always)]
+    fn outside<K: Kernel>(&mut self, k: K, n: usize) {
+        let outer = 1 + 2 * n;
+        let (e0, f0, e1, f1, f_last) = (self.at(k, 1), self.at(k, 2), self.at(k, 3), self.at(k, 4), self.at(k, 2 * n));
+        let (apex, p1, p2, p3) = (self.at(k, 0), self.at(k, outer), self.at(k, outer + 1), self.at(k, outer + 2));
+        let (p4, p5) = (self.at(k, outer + 3), self.at(k, outer + 4));
+        let (p6, p7) = (self.at(k, outer + 5), self.at(k, outer + 6));
+        let face = [k.load4(&self.out[2].0), k.load4(&self.out[4].0), k.load4(&self.out[2 * n].0)];
+        let [face_0, face_1, face_last] = face;
+        let below = mean(k, e0, f_last, p1, p2);
+        let right = mean(k, e0, f0, p2, p3);
+        let corner = mean(k, f0, p3, p4, p5);
+        let above = mean(k, f0, e1, p5, p6);
+        let left = mean(k, e1, f1, p6, p7);
+        self.set(k, outer, mean(k, e0, f_last, face_last, below));
+        self.set(k, outer + 1, vertex_point(k, e0, [apex, p2, f0, f_last], [face_0, face_last, below, right]));
+        self.set(k, outer + 2, mean(k, e0, f0, face_0, right));
+        self.set(k, outer + 3, vertex_point(k, f0, [e0, e1, p3, p5], [face_0, right, corner, above]));
+        self.set(k, outer + 4, mean(k, e1, f0, face_0, above));
+        self.set(k, outer + 5, vertex_point(k, e1, [apex, f0, p6, f1], [face_0, above, left, face_1]));
+        self.set(k, outer + 6, mean(k, e1, f1, face_1, left));
+        let beyond = outer + N_OUTER;
+        self.set(k, beyond, below);
+        self.set(k, beyond + 1, mean(k, e0, p2, below, right));
+        self.set(k, beyond + 2, right);
+        self.set(k, beyond + 3, mean(k, f0, p3, right, corner));
+        self.set(k, beyond + 4, corner);
+        self.set(k, beyond + 5, mean(k, f0, p5, corner, above));
+        self.set(k, beyond + 6, above);
+        self.set(k, beyond + 7, mean(k, e1, p6, above, left));
+        self.set(k, beyond + 8, left);
+    }
+}
+
+impl<I: Index> Task for PoleStep<'_, I> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(mut self, k: K) {
+        let n = (self.ring.len() - 1 - N_OUTER) / 2;
+        assert_eq!(self.out.len(), self.ring.len() + N_BEYOND, "a pole's refined points");
+        self.fan(k, n);
+        self.outside(k, n);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plan::{NodeId, Plan};
+    use super::super::products::{products, refined_points};
+    use super::super::surface::Surface;
+    use super::*;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn the_step_gives_what_the_rows_give() {
+        let mut n_poles = 0;
+        for valence in [3, 5, 6, 7, 8, 32, 100] {
+            let surface = Surface::new(&shapes::quad_pole(valence), 1).unwrap();
+            let library = surface.plans();
+            for node in (0..library.len() as u32).map(|index| NodeId(4 * index)) {
+                let Plan::Split { step, .. } = library.plan(node) else { continue };
+                if step.pole.is_none() {
+                    continue;
+                }
+                n_poles += 1;
+                let at = |i: usize| Point::new((i as f64).sin(), (1.7 * i as f64).cos(), (0.3 * i as f64).sin());
+                let ring: Vec<Point> = (0..library.n_points(node)).map(at).collect();
+                let mut expected = vec![Point::ZERO; step.rows.len()];
+                products(library.rows(), step.rows, &ring, &mut expected);
+                let mut out = vec![Point::ZERO; step.rows.len()];
+                refined_points(library.rows(), step, &ring, &mut out);
+                for (a, b) in out.iter().zip(&expected) {
+                    assert!((*a - *b).max_abs() < 1e-14, "valence {valence}: {a:?} {b:?}");
+                }
+            }
+        }
+        assert!(n_poles >= 7, "every valence has its pole: {n_poles}");
+    }
+}
