@@ -147,9 +147,11 @@ impl Evaluator {
     /// Enlarges `bounds` by the Bézier hull of a part of a regular patch.
     pub fn grow_by_hull(&mut self, bounds: &mut DBounds, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) {
         let [of_u, of_v] = &mut self.hulls;
-        for p in simd::run(regular::Hull { control, u: of_u.get(u), v: of_v.get(v) }) {
-            bounds.grow(p.to_vec());
-        }
+        let hull = match [u, v] == [[0.0, 1.0]; 2] {
+            true => simd::run(regular::WholeHull { control }),
+            false => simd::run(regular::Hull { control, u: of_u.get(u), v: of_v.get(v) }),
+        };
+        hull.iter().for_each(|p| bounds.grow(p.to_vec()));
     }
 }
 

@@ -35,6 +35,7 @@ mod pole;
 mod products;
 pub mod refine;
 pub mod regular;
+mod route;
 pub mod rows;
 pub mod rules;
 pub mod surface;

@@ -5,7 +5,7 @@
 
 use super::eval::Point;
 use super::plan::{Child, NodeId, Plan, PlanLibrary};
-use super::products::{control_points, listed_control, refined_points};
+use super::products::{control_points, push_listed_control, refined_points};
 use super::regular::ControlPoints;
 
 /// Parts that are kept. A corner needs four a level, a crease four times as many on each level; what is beyond is found
@@ -108,7 +108,7 @@ impl Parts {
         let (store, plan) = (library.rows(), library.plan(child.node));
         match plan {
             Plan::Regular(rows, turn) if rows.is_empty() => {
-                self.points.extend_from_slice(&listed_control(store, child.points, turn, &self.scratch));
+                push_listed_control(store, child.points, turn, &self.scratch, &mut self.points);
             }
             Plan::Regular(rows, turn) => {
                 store.gather_to(child.points, &self.scratch, &mut self.points);

@@ -2,6 +2,7 @@
 
 use super::local::{LocalMesh, RingWalker};
 use super::pole::Pole;
+use super::route::route;
 use super::rows::{RowStore, Span, SparseRows};
 use super::rules::{self, CornerLimit, Origin, RefinedView, Row, RuleSet};
 use crate::mesh::CreaseMethod;
@@ -145,8 +146,9 @@ fn unturned(k: usize, turn: u32) -> usize {
 struct Node {
     n_points: u32,
     rows: SparseRows,
-    /// See [`Step::pole`]; nothing if the ring is none.
-    pole: Span,
+    /// Where its ring's route starts, and how many points of [`Step::pole`] come before that.
+    shape: Span,
+    n_pole: u32,
     /// Where its children start, and how many there are: 0 for regular nodes, [`NONE`] as long as it is being made.
     children: u32,
     n_children: u32,
@@ -202,6 +204,13 @@ impl PlanLibrary {
         self.nodes[node.index()].n_points as usize
     }
 
+    /// The route of a node's ring, which starts at the corner that is the turn; empty if there is none.
+    #[inline]
+    pub(super) fn route(&self, node: NodeId) -> Span {
+        let Node { shape, n_pole, .. } = self.nodes[node.index()];
+        shape.split_at(n_pole)[1]
+    }
+
     /// A node's plan.
     #[inline]
     pub fn plan(&self, node: NodeId) -> Plan<'_> {
@@ -214,7 +223,7 @@ impl PlanLibrary {
         let n_limits = if children.len() == 4 { 4 } else { 0 };
         let limits = &self.limits[node.limits as usize..][..n_limits];
         let (children, limits) = (Children { all: children, turn }, Limits { all: limits, turn });
-        let pole = (!node.pole.is_empty()).then_some(node.pole);
+        let pole = (node.n_pole != 0).then(|| node.shape.split_at(node.n_pole)[0]);
         Plan::Split { step: Step { rows: node.rows, pole }, children, limits, in_hull: node.in_hull }
     }
 
@@ -271,8 +280,9 @@ impl PlanLibrary {
         let id = NodeId::unturned(self.nodes.len());
         let nothing = self.rows.push([]);
         let n_points = ring.n_vertices() as u32;
-        let pole = self.rows.push_indices(&[]);
-        self.nodes.push(Node { n_points, rows: nothing, pole, children: 0, n_children: NONE, limits: 0, in_hull: true });
+        let shape = self.rows.push_indices(&route(ring));
+        let node = Node { n_points, rows: nothing, shape, n_pole: 0, children: 0, n_children: NONE, limits: 0, in_hull: true };
+        self.nodes.push(node);
         self.by_key.insert(key.to_vec(), id);
         let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
         match regular {
@@ -289,7 +299,11 @@ impl PlanLibrary {
         let n = ring.n_corners();
         let (rows, quarters, pole) = self.quarters(ring);
         let rows = self.rows.push(&rows);
-        self.nodes[id.index()].pole = self.rows.push_indices(&pole);
+        if !pole.is_empty() {
+            let shape = self.rows.push_indices(&[&pole[..], &route(ring)].concat());
+            let node = &mut self.nodes[id.index()];
+            (node.shape, node.n_pole) = (shape, pole.len() as u32);
+        }
         let children: Vec<Child> = quarters
             .into_iter()
             .map(|Quarter { node, turn, points }| {
@@ -326,8 +340,8 @@ impl PlanLibrary {
 
     fn push_plain(&mut self) -> NodeId {
         let id = NodeId::unturned(self.nodes.len());
-        let (rows, pole) = (self.rows.push([]), self.rows.push_indices(&[]));
-        self.nodes.push(Node { n_points: 16, rows, pole, children: 0, n_children: 0, limits: 0, in_hull: true });
+        let (rows, shape) = (self.rows.push([]), self.rows.push_indices(&[]));
+        self.nodes.push(Node { n_points: 16, rows, shape, n_pole: 0, children: 0, n_children: 0, limits: 0, in_hull: true });
         id
     }
 

@@ -90,24 +90,33 @@ pub(super) fn one_product(store: &RowStore, rows: SparseRows, i: usize, points: 
 pub(super) fn control_points(store: &RowStore, rows: SparseRows, turn: u32, points: &[Point]) -> ControlPoints {
     let places = &TURNED_CONTROL[turn as usize];
     if rows.is_empty() {
-        return places.map(|i| points[usize::from(i)]);
+        return turned(places, points.first_chunk().expect("16 control points"));
     }
     let mut control = [Point::ZERO; 16];
     products(store, rows, points, &mut control);
-    if turn == 0 { control } else { places.map(|i| control[usize::from(i)]) }
+    if turn == 0 { control } else { turned(places, &control) }
 }
 
-/// As [`control_points`] of a child without rows; `refined` are its parent's.
-pub(super) fn listed_control(store: &RowStore, list: Span, turn: u32, refined: &[Point]) -> ControlPoints {
+#[inline(always)]
+fn turned(places: &[u8; 16], control: &ControlPoints) -> ControlPoints {
+    let mut out = [Point::ZERO; 16];
+    for (out, &i) in out.iter_mut().zip(places) {
+        *out = control[usize::from(i)];
+    }
+    out
+}
+
+/// As [`control_points`] of a child without rows; `refined` are its parent's, and the points are appended.
+pub(super) fn push_listed_control(store: &RowStore, list: Span, turn: u32, refined: &[Point], out: &mut Vec<Point>) {
     let places = &TURNED_CONTROL[turn as usize];
     match store.widths() {
-        Width::Narrow(indices) => copy_turned(places, store.list(list, indices), refined),
-        Width::Wide(indices) => copy_turned(places, store.list(list, indices), refined),
+        Width::Narrow(indices) => push_turned(places, store.list(list, indices), refined, out),
+        Width::Wide(indices) => push_turned(places, store.list(list, indices), refined, out),
     }
 }
 
 #[inline(always)]
-fn copy_turned<I: Index>(places: &[u8; 16], list: &[I], refined: &[Point]) -> ControlPoints {
+fn push_turned<I: Index>(places: &[u8; 16], list: &[I], refined: &[Point], out: &mut Vec<Point>) {
     let list: &[I; 16] = list.first_chunk().expect("16 control points");
-    places.map(|i| refined[list[usize::from(i)].idx()])
+    out.extend(places.iter().map(|&i| refined[list[usize::from(i)].idx()]));
 }

@@ -207,6 +207,45 @@ impl Task for Hull<'_> {
     }
 }
 
+/// [`Hull`] of a whole patch, whose weights are multiples of a sixth.
+pub(super) struct WholeHull<'a> {
+    pub control: &'a ControlPoints,
+}
+
+/// Six times the Bézier points of a segment.
+#[inline(always)]
+fn bezier_points<K: Kernel>(k: K, c: [K::D; 4]) -> [K::D; 4] {
+    let (twice_1, twice_2) = (k.add4(c[1], c[1]), k.add4(c[2], c[2]));
+    let (inner_1, inner_2) = (k.add4(twice_1, c[2]), k.add4(c[1], twice_2));
+    [
+        k.add4(k.add4(c[0], twice_1), inner_1),
+        k.add4(inner_1, inner_1),
+        k.add4(inner_2, inner_2),
+        k.add4(inner_2, k.add4(twice_2, c[3])),
+    ]
+}
+
+impl Task for WholeHull<'_> {
+    type Output = [Point; 2];
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> [Point; 2] {
+        let c = self.control;
+        let mut columns = [[k.splat4(0.0); 4]; 4];
+        for (i, column) in columns.iter_mut().enumerate() {
+            *column =
+                bezier_points(k, [k.load4(&c[i].0), k.load4(&c[4 + i].0), k.load4(&c[8 + i].0), k.load4(&c[12 + i].0)]);
+        }
+        let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
+        for j in 0..4 {
+            for p in bezier_points(k, [columns[0][j], columns[1][j], columns[2][j], columns[3][j]]) {
+                (low, high) = (k.min4(low, p), k.max4(high, p));
+            }
+        }
+        let scale = k.splat4(1.0 / 36.0);
+        [Point(k.store4(k.mul4(low, scale))), Point(k.store4(k.mul4(high, scale)))]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -261,6 +300,15 @@ mod tests {
             let excess = [tight[0].0[axis] - low.0[axis], high.0[axis] - tight[1].0[axis]];
             assert!(excess.iter().all(|e| *e < 0.2), "{axis}: {excess:?}");
         }
+    }
+
+    #[test]
+    fn the_hull_of_a_whole_patch_is_that_of_its_bezier_points() {
+        let c = control_points();
+        let whole = bezier_weights([0.0, 1.0]);
+        let expected = run(Hull { control: &c, u: &whole, v: &whole });
+        let hull = run(WholeHull { control: &c });
+        assert!((0..2).all(|k| (hull[k] - expected[k]).max_abs() < 1e-14), "{hull:?} {expected:?}");
     }
 
     #[test]

@@ -46,6 +46,13 @@ impl Span {
     pub fn is_empty(self) -> bool {
         self.len == 0
     }
+
+    /// Its first `n` indices, and the others.
+    #[inline(always)]
+    pub fn split_at(self, n: u32) -> [Self; 2] {
+        debug_assert!(n <= self.len);
+        [Self { first: self.first, len: n }, Self { first: self.first + n, len: self.len - n }]
+    }
 }
 
 /// A row: where its columns and its weights start, and how many there are.
@@ -102,7 +109,8 @@ impl Default for RowStore {
 }
 
 /// An index of either width.
-pub(super) trait Index: Copy {
+pub trait Index: Copy {
+    /// For slices.
     fn idx(self) -> usize;
 }
 

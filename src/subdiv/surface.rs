@@ -6,6 +6,8 @@ use super::local::RingWalker;
 use super::parts::Parts;
 use super::plan::{NodeId, PlanLibrary};
 use super::regular::ControlPoints;
+use super::route::RouteWalker;
+use super::rows::Width;
 use super::rules::RuleSet;
 use crate::error::{Error, Result};
 use crate::ids::{FaceId, PatchId};
@@ -88,7 +90,28 @@ pub struct PatchPoints {
     /// The last polygon, and the points of its ring and refinement.
     polygon_face: Option<(u64, FaceId)>,
     polygon: Vec<Point>,
-    walker: RingWalker,
+    walker: Walker,
+}
+
+/// Finds a ring's vertices.
+#[derive(Debug, Default)]
+struct Walker {
+    by_route: RouteWalker,
+    by_faces: RingWalker,
+}
+
+impl Walker {
+    /// The vertices of the ring of the face of `first`, where its node's corner 0 lies.
+    fn ring(&mut self, surface: &Surface, node: NodeId, first: u32) -> &[u32] {
+        let (topology, store, route) = (&surface.topology, surface.plans.rows(), surface.plans.route(node));
+        if route.is_empty() {
+            return self.by_faces.sources(topology, first);
+        }
+        match store.widths() {
+            Width::Narrow(indices) => self.by_route.follow(topology, first, store.list(route, indices)),
+            Width::Wide(indices) => self.by_route.follow(topology, first, store.list(route, indices)),
+        }
+    }
 }
 
 impl Default for PatchPoints {
@@ -100,7 +123,7 @@ impl Default for PatchPoints {
             parts: Parts::default(),
             polygon_face: None,
             polygon: Vec::new(),
-            walker: RingWalker::default(),
+            walker: Walker::default(),
         }
     }
 }
@@ -260,7 +283,7 @@ impl Surface {
             return;
         }
         if size == 4 {
-            let sources = points.walker.sources(&self.topology, first + points.node.turn());
+            let sources = points.walker.ring(self, points.node, first + points.node.turn());
             points.parts.new_ring().extend(sources.iter().map(|&v| self.control_point(v)));
         } else {
             self.load_polygon(face, points);
@@ -278,7 +301,7 @@ impl Surface {
         }
         points.polygon_face = Some((self.id, face));
         let (first, _) = self.topology.face_corners(face.0);
-        let sources = points.walker.sources(&self.topology, first);
+        let sources = points.walker.ring(self, points.node, first);
         points.polygon.clear();
         points.polygon.extend(sources.iter().map(|&v| self.control_point(v)));
         Evaluator::refine_polygon(&self.plans, points.node, &mut points.polygon);

@@ -420,7 +420,7 @@ impl Topology {
 
     /// Whether a face that is no quad lies along the edge of `h`, on either side.
     pub fn touches_polygon(&self, h: u32) -> bool {
-        let is_polygon = |h: u32| self.faces.corners(self.faces.face(h)).1 != 4;
+        let is_polygon = |h: u32| self.faces.corners_at(h).1 != 4;
         let twin = self.twin[h as usize];
         if self.all_quads() {
             return false;
@@ -494,6 +494,11 @@ impl HalfEdges for Topology {
     #[inline]
     fn face_corners(&self, face: u32) -> (u32, u32) {
         self.faces.corners(face)
+    }
+
+    #[inline]
+    fn corners_at(&self, h: u32) -> (u32, u32) {
+        self.faces.corners_at(h)
     }
 
     #[inline]

@@ -13,7 +13,7 @@ pub enum FaceIndex {
     Mixed {
         /// First half-edge of each face, and the total at the end.
         start: Vec<u32>,
-        /// A bit per half-edge, set where a face starts.
+        /// A bit per half-edge, set where a face starts, and at the end.
         is_start: Vec<u64>,
         /// Number of set bits before each word of `is_start`.
         rank: Vec<u32>,
@@ -41,6 +41,8 @@ impl FaceIndex {
         for &s in &start {
             is_start[s as usize / 64] |= 1 << (s % 64);
         }
+        // One more, for the last face's end.
+        is_start[total as usize / 64] |= 1 << (total % 64);
         start.push(total);
         let mut before = 0;
         let rank = is_start
@@ -93,6 +95,20 @@ impl FaceIndex {
         }
     }
 
+    /// [`corners`](Self::corners) of the face of `h`: from the bits next to its own, which cost less than the face's number.
+    #[inline]
+    pub fn corners_at(&self, h: u32) -> (u32, u32) {
+        match self {
+            FaceIndex::Quads { .. } => (h & !3, 4),
+            FaceIndex::Mixed { is_start, .. } => {
+                let (word, bit) = (h as usize / 64, h % 64);
+                let start = last_bit(is_start, word, is_start[word] & (u64::MAX >> (63 - bit)));
+                let end = first_bit(is_start, word, is_start[word] & ((u64::MAX << bit) << 1));
+                (start, end - start)
+            }
+        }
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         match self {
@@ -100,6 +116,26 @@ impl FaceIndex {
             FaceIndex::Mixed { start, is_start, rank } => 4 * start.len() + 8 * is_start.len() + 4 * rank.len(),
         }
     }
+}
+
+/// The last bit that is set in the words up to `word`, of which only `bits` count.
+#[inline(always)]
+fn last_bit(words: &[u64], mut word: usize, mut bits: u64) -> u32 {
+    while bits == 0 {
+        word -= 1;
+        bits = words[word];
+    }
+    64 * word as u32 + 63 - bits.leading_zeros()
+}
+
+/// The first bit that is set in the words from `word` on, of which only `bits` count.
+#[inline(always)]
+fn first_bit(words: &[u64], mut word: usize, mut bits: u64) -> u32 {
+    while bits == 0 {
+        word += 1;
+        bits = words[word];
+    }
+    64 * word as u32 + bits.trailing_zeros()
 }
 
 #[cfg(test)]
@@ -113,7 +149,7 @@ mod tests {
         for f in 0..sizes.len() as u32 {
             let (start, n) = index.corners(f);
             assert_eq!(n, sizes[f as usize]);
-            assert!((start..start + n).all(|h| index.face(h) == f));
+            assert!((start..start + n).all(|h| index.face(h) == f && index.corners_at(h) == (start, n)));
         }
     }
 }

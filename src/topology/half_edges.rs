@@ -33,6 +33,11 @@ pub trait HalfEdges {
     fn face(&self, h: u32) -> u32;
     /// The first half-edge of a face and its number of corners.
     fn face_corners(&self, face: u32) -> (u32, u32);
+    /// [`face_corners`](Self::face_corners) of the face of `h`.
+    #[inline]
+    fn corners_at(&self, h: u32) -> (u32, u32) {
+        self.face_corners(self.face(h))
+    }
     /// Sharpness of the edge of `h`.
     fn edge_sharpness(&self, h: u32) -> f32;
     /// Tags of the vertex where `h` starts.
@@ -51,14 +56,14 @@ pub trait HalfEdges {
     /// The next half-edge of the face.
     #[inline]
     fn next(&self, h: u32) -> u32 {
-        let (start, n) = self.face_corners(self.face(h));
+        let (start, n) = self.corners_at(h);
         if h + 1 == start + n { start } else { h + 1 }
     }
 
     /// The previous half-edge of the face.
     #[inline]
     fn prev(&self, h: u32) -> u32 {
-        let (start, n) = self.face_corners(self.face(h));
+        let (start, n) = self.corners_at(h);
         if h == start { start + n - 1 } else { h - 1 }
     }
 }
