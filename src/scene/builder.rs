@@ -120,11 +120,16 @@ impl<'w> Builder<'w> {
         // A child's cells are a part of the patch: as many splits lead to a quarter of its size.
         let depth = (rates.n_u.max(rates.n_v) / side).max(1).ilog2() + CHILD_BOX_DEPTH;
         self.boxes.clear();
+        let (surface, from) = (of.mesh.surface(), [u32::from(cells.i0), u32::from(cells.j0)]);
+        let n = [n_u, n_v];
+        let no_holes = !surface.edited().has_holes();
+        if no_holes && self.dicer.bounds_of_parts(surface, of.patch, rates, from, n, side, depth, &mut self.boxes) {
+            return n.map(|n| n as u8);
+        }
         for b in 0..n_v {
             for a in 0..n_u {
                 let c = child_cells(cells, side, a, b);
                 let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
-                let surface = of.mesh.surface();
                 self.boxes.push(match surface.edited().hide_cells(of.patch, rates, i, j) {
                     true => Bounds::EMPTY,
                     false => self.dicer.bounds(surface, of.patch, rates, i, j, depth),

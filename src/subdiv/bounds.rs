@@ -2,11 +2,16 @@
 
 use super::eval::{Evaluator, Point, quarter};
 use super::parts::Parts;
-use super::plan::{NodeId, Plan, PlanLibrary};
+use super::plan::{NodeId, Plan, PlanLibrary, Step};
+use super::pole::{self, PoleHull};
 use super::products::control_points;
-use super::regular::{self, BezierWeights, ControlPoints, bezier_weights};
+use super::regular::{self, BezierWeights, ControlPoints, MOST_PARTS, bezier_weights};
+use super::rows::Width;
 use crate::math::DBounds;
 use crate::math::simd;
+
+/// The parameters of a whole patch.
+const WHOLE: [[f64; 2]; 2] = [[0.0, 1.0]; 2];
 
 /// Weights of the last ranges along u and along v.
 pub(super) type HullWeights = [RangeWeights; 2];
@@ -73,6 +78,11 @@ impl Evaluator {
         let node = parts.node(part);
         if depth == 0 && matches!(library.plan(node), Plan::Split { in_hull: true, .. }) {
             return parts.points(part).iter().for_each(|p| bounds.grow(p.to_vec()));
+        }
+        if let (WHOLE, Some([low, high])) = ([u, v], pole_hull(library, node, parts.points(part), depth)) {
+            bounds.grow(low.to_vec());
+            bounds.grow(high.to_vec());
+            return;
         }
         let Some(first) = parts.quarters(library, part) else {
             let ring = self.start_ring(parts.points(part));
@@ -147,12 +157,101 @@ impl Evaluator {
     /// Enlarges `bounds` by the Bézier hull of a part of a regular patch.
     pub fn grow_by_hull(&mut self, bounds: &mut DBounds, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) {
         let [of_u, of_v] = &mut self.hulls;
-        let hull = match [u, v] == [[0.0, 1.0]; 2] {
-            true => simd::run(regular::WholeHull { control }),
-            false => simd::run(regular::Hull { control, u: of_u.get(u), v: of_v.get(v) }),
+        let hull = match [u, v] {
+            WHOLE => simd::run(regular::WholeHull { control }),
+            _ => simd::run(regular::Hull { control, u: of_u.get(u), v: of_v.get(v) }),
         };
         hull.iter().for_each(|p| bounds.grow(p.to_vec()));
     }
+}
+
+/// The boxes of equal parts, `MOST_PARTS` apart in each direction.
+pub(super) type GridBoxes = [[Point; 2]; MOST_PARTS * MOST_PARTS];
+
+impl Evaluator {
+    /// The boxes of `side` x `side` equal parts (1, 2 or 4) of the part `[u0,u1] x [v0,v1]` of an irregular patch, which is
+    /// the patch or a quarter of a quarter and so on; `depth` is as for each box alone. Returns whether it could be done.
+    pub(super) fn grid_of_parts(
+        &mut self,
+        library: &PlanLibrary,
+        parts: &mut Parts,
+        [u, v]: [[f64; 2]; 2],
+        side: usize,
+        depth: u32,
+        out: &mut GridBoxes,
+    ) -> bool {
+        self.bound_grid(library, parts, 0, [u, v], side, depth, 0, out)
+    }
+
+    /// As [`grid_of_parts`](Self::grid_of_parts) for a part of the patch; `first` is where its first box goes.
+    #[allow(clippy::too_many_arguments)]
+    fn bound_grid(
+        &mut self,
+        library: &PlanLibrary,
+        parts: &mut Parts,
+        part: usize,
+        [u, v]: [[f64; 2]; 2],
+        side: usize,
+        depth: u32,
+        first: usize,
+        out: &mut GridBoxes,
+    ) -> bool {
+        if side == 1 {
+            let mut bounds = DBounds::EMPTY;
+            self.bound_parts(library, parts, part, u, v, depth, &mut bounds);
+            out[first] = [bounds.min, bounds.max].map(|p| Point::new(p.x, p.y, p.z));
+            return true;
+        }
+        if let Some(control) = parts.control(part) {
+            let mut boxes = [[Point::ZERO; 2]; MOST_PARTS * MOST_PARTS];
+            self.regular_grid_boxes(control, [u, v], side, &mut boxes);
+            for row in 0..side {
+                let at = MOST_PARTS * row;
+                out[first + at..][..side].copy_from_slice(&boxes[at..][..side]);
+            }
+            return true;
+        }
+        let Some(quarters) = parts.quarters(library, part) else { return false };
+        let below = depth.saturating_sub(1);
+        if [u, v] == WHOLE {
+            let half = side / 2;
+            return (0..4).all(|k| {
+                let (x, y) = quarter(k);
+                let first = first + half * (x as usize + MOST_PARTS * y as usize);
+                self.bound_grid(library, parts, quarters + k, WHOLE, half, below, first, out)
+            });
+        }
+        let k = usize::from(u[0] >= 0.5) ^ if v[0] >= 0.5 { 3 } else { 0 };
+        let (x, y) = quarter(k);
+        let [u, v] = [u.map(|t| 2.0 * t - x), v.map(|t| 2.0 * t - y)];
+        let is_inside = u[1] <= 1.0 && v[1] <= 1.0;
+        is_inside && self.bound_grid(library, parts, quarters + k, [u, v], side, below, first, out)
+    }
+
+    /// As [`grid_of_parts`](Self::grid_of_parts) for 16 control points, and any rectangle.
+    pub(super) fn regular_grid_boxes(
+        &mut self,
+        control: &ControlPoints,
+        [u, v]: [[f64; 2]; 2],
+        side: usize,
+        out: &mut GridBoxes,
+    ) {
+        let [of_u, of_v] = &mut self.hulls;
+        simd::run(regular::GridHulls { control, u: of_u.get(u), v: of_v.get(v), side, out });
+    }
+}
+
+/// The box around a whole pole, if the node is one that has no more points than there is room for.
+fn pole_hull(library: &PlanLibrary, node: NodeId, ring: &[Point], depth: u32) -> Option<[Point; 2]> {
+    let Plan::Split { step: Step { pole: Some(order), .. }, in_hull: true, .. } = library.plan(node) else { return None };
+    if depth == 0 || order.len() > pole::MOST_POINTS {
+        return None;
+    }
+    let store = library.rows();
+    Some(match store.widths() {
+        Width::Narrow(indices) => simd::run(PoleHull { points: ring, ring: store.list(order, indices), depth }),
+        Width::Wide(indices) => simd::run(PoleHull { points: ring, ring: store.list(order, indices), depth }),
+    })
 }
 
 /// The part of a parameter range that lies in the lower (0) or upper (1) half, as the half sees it. Where a range only

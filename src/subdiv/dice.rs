@@ -10,7 +10,8 @@
 //! the other just outside, they still agree: the owner's value lies within the evaluation error, far less than the
 //! guard, of one that is a whole guard away from the boundary.
 
-use super::eval::{Evaluator, SurfaceSample};
+use super::eval::{Evaluator, Point, SurfaceSample};
+use super::regular::MOST_PARTS;
 use super::surface::{PatchPoints, Surface};
 use crate::ids::{FaceId, PatchId};
 use crate::math::lattice_grid::MOST_NEAR;
@@ -335,6 +336,40 @@ impl Dicer {
             }
         }
         to_lattice_box(bounds.min, bounds.max)
+    }
+
+    /// Appends the [`bounds`](Self::bounds) of `n[0]` x `n[1]` parts of `side` x `side` cells from (`from[0]`, `from[1]`) on, if
+    /// they can be found together: where a square of two or four parts a side has no side that is coarser than its cells.
+    /// Returns whether that is so.
+    #[allow(clippy::too_many_arguments)]
+    pub fn bounds_of_parts(
+        &mut self,
+        surface: &Surface,
+        patch: PatchId,
+        rates: &PatchRates,
+        from: [u32; 2],
+        n: [u32; 2],
+        side: u32,
+        depth: u32,
+        out: &mut Vec<Bounds>,
+    ) -> bool {
+        let cells = [rates.n_u, rates.n_v];
+        let is_plain = (0..4).all(|k| rates.sides[k] == cells[k % 2]);
+        let is_whole = (0..2).all(|k| from[k] + n[k] * side <= cells[k]);
+        if !is_plain || !is_whole || n[0] != n[1] || ![2, 4].contains(&n[0]) {
+            return false;
+        }
+        let lane = self.load(surface, patch);
+        let at = |k: usize, i: u32| f64::from(i) / f64::from(cells[k]);
+        let rectangle = [0, 1].map(|k| [at(k, from[k]), at(k, from[k] + n[k] * side)]);
+        let n = n[0] as usize;
+        let mut boxes = [[Point::ZERO; 2]; MOST_PARTS * MOST_PARTS];
+        if !surface.grid_boxes(&mut self.points[lane], &mut self.evaluator, rectangle, n, depth, &mut boxes) {
+            return false;
+        }
+        let boxes = boxes.chunks_exact(MOST_PARTS).take(n).flat_map(|row| &row[..n]);
+        out.extend(boxes.map(|[low, high]| to_lattice_box(low.to_vec(), high.to_vec())));
+        true
     }
 
     /// As [`bounds`](Self::bounds) for a whole patch at any rates.

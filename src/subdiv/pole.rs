@@ -18,6 +18,7 @@
 
 use super::eval::Point;
 use super::local::LocalMesh;
+use super::regular::whole_hull;
 use super::rows::Index;
 use super::rules::RefinedView;
 use crate::math::simd::{Kernel, Task};
@@ -199,6 +200,100 @@ impl<I: Index> Task for PoleStep<'_, I> {
         assert_eq!(self.out.len(), self.ring.len() + N_BEYOND, "a pole's refined points");
         self.fan(k, n);
         self.outside(k, n);
+    }
+}
+
+/// Points of a ring that [`PoleHull`] has room for: an apex of 24 edges.
+pub(super) const MOST_POINTS: usize = 1 + 2 * 24 + N_OUTER;
+
+/// The numbers of points that are in a pole's order.
+const IN_ORDER: [u8; MOST_POINTS] = {
+    let mut order = [0; MOST_POINTS];
+    let mut i = 0;
+    while i < MOST_POINTS {
+        order[i] = i as u8;
+        i += 1;
+    }
+    order
+};
+
+/// A box around a whole pole of up to [`MOST_POINTS`] points, [low, high]: after each of `depth` steps, one or more, around
+/// the Bézier points of the regular quarters, and at last around the points of what is left.
+pub(super) struct PoleHull<'a, I> {
+    pub points: &'a [Point],
+    /// See [`PoleStep`].
+    pub ring: &'a [I],
+    pub depth: u32,
+}
+
+/// The control points of the regular quarters among the refined points of a pole with `n` faces around its apex.
+#[inline(always)]
+fn regular_quarters(n: usize) -> [[usize; 16]; 3] {
+    let (outer, beyond) = (1 + 2 * n, 1 + 2 * n + N_OUTER);
+    let below = [2 * n - 1, 2 * n, outer, beyond];
+    let row_0 = [5, 0, 1, outer + 1, beyond + 1];
+    let row_1 = [4, 3, 2, outer + 2, beyond + 2];
+    let row_2 = [outer + 6, outer + 5, outer + 4, outer + 3, beyond + 3];
+    let row_3 = [beyond + 8, beyond + 7, beyond + 6, beyond + 5, beyond + 4];
+    let right = |row: [usize; 5]| [row[1], row[2], row[3], row[4]];
+    let left = |row: [usize; 5]| [row[0], row[1], row[2], row[3]];
+    [
+        joined([below, right(row_0), right(row_1), right(row_2)]),
+        joined([right(row_0), right(row_1), right(row_2), right(row_3)]),
+        joined([left(row_0), left(row_1), left(row_2), left(row_3)]),
+    ]
+}
+
+#[inline(always)]
+fn joined(rows: [[usize; 4]; 4]) -> [usize; 16] {
+    std::array::from_fn(|i| rows[i / 4][i % 4])
+}
+
+/// The box of some points, grown.
+#[inline(always)]
+fn grow_by_points<K: Kernel>(k: K, points: &[Point], low: &mut K::D, high: &mut K::D) {
+    for p in points {
+        let p = k.load4(&p.0);
+        (*low, *high) = (k.min4(*low, p), k.max4(*high, p));
+    }
+}
+
+impl<I: Index> Task for PoleHull<'_, I> {
+    type Output = [Point; 2];
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> [Point; 2] {
+        let (n_ring, n_refined) = (self.ring.len(), self.ring.len() + N_BEYOND);
+        let quarters = regular_quarters((n_ring - 1 - N_OUTER) / 2);
+        let mut buffers = [[Point::ZERO; MOST_POINTS + N_BEYOND]; 2];
+        let [mut refined, mut before] = buffers.each_mut();
+        let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
+        for level in 0..self.depth {
+            match level {
+                0 => PoleStep { points: self.points, ring: self.ring, out: &mut refined[..n_refined] }.run(k),
+                _ => {
+                    PoleStep { points: before, ring: &IN_ORDER[..n_ring], out: &mut refined[..n_refined] }.run(k);
+                }
+            }
+            if level > 0 && level + 1 == self.depth {
+                // What these points reach beyond the last quarter lies in the others of the level before.
+                grow_by_points(k, &refined[..n_refined], &mut low, &mut high);
+            } else {
+                for quarter in &quarters {
+                    let mut control = [k.splat4(0.0); 16];
+                    for (lanes, &i) in control.iter_mut().zip(quarter) {
+                        *lanes = k.load4(&refined[i].0);
+                    }
+                    let (l, h) = whole_hull(k, &control);
+                    let scale = k.splat4(1.0 / 36.0);
+                    (low, high) = (k.min4(low, k.mul4(l, scale)), k.max4(high, k.mul4(h, scale)));
+                }
+                if self.depth == 1 {
+                    grow_by_points(k, &refined[..n_ring], &mut low, &mut high);
+                }
+            }
+            (refined, before) = (before, refined);
+        }
+        [Point(k.store4(low)), Point(k.store4(high))]
     }
 }
 

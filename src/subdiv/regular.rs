@@ -225,24 +225,116 @@ fn bezier_points<K: Kernel>(k: K, c: [K::D; 4]) -> [K::D; 4] {
     ]
 }
 
+/// The lowest and the highest of 36 times the Bézier points of a patch.
+#[inline(always)]
+pub(super) fn whole_hull<K: Kernel>(k: K, c: &[K::D; 16]) -> (K::D, K::D) {
+    let mut columns = [[k.splat4(0.0); 4]; 4];
+    for (i, column) in columns.iter_mut().enumerate() {
+        *column = bezier_points(k, [c[i], c[4 + i], c[8 + i], c[12 + i]]);
+    }
+    let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
+    for j in 0..4 {
+        for p in bezier_points(k, [columns[0][j], columns[1][j], columns[2][j], columns[3][j]]) {
+            (low, high) = (k.min4(low, p), k.max4(high, p));
+        }
+    }
+    (low, high)
+}
+
 impl Task for WholeHull<'_> {
     type Output = [Point; 2];
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) -> [Point; 2] {
-        let c = self.control;
-        let mut columns = [[k.splat4(0.0); 4]; 4];
-        for (i, column) in columns.iter_mut().enumerate() {
-            *column =
-                bezier_points(k, [k.load4(&c[i].0), k.load4(&c[4 + i].0), k.load4(&c[8 + i].0), k.load4(&c[12 + i].0)]);
+        let mut control = [k.splat4(0.0); 16];
+        for (lanes, point) in control.iter_mut().zip(self.control) {
+            *lanes = k.load4(&point.0);
         }
-        let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
-        for j in 0..4 {
-            for p in bezier_points(k, [columns[0][j], columns[1][j], columns[2][j], columns[3][j]]) {
-                (low, high) = (k.min4(low, p), k.max4(high, p));
-            }
-        }
+        let (low, high) = whole_hull(k, &control);
         let scale = k.splat4(1.0 / 36.0);
         [Point(k.store4(k.mul4(low, scale))), Point(k.store4(k.mul4(high, scale)))]
+    }
+}
+
+/// Parts along a side that [`GridHulls`] has at most.
+pub(super) const MOST_PARTS: usize = 4;
+
+/// Bézier points along a side of that many parts, ends shared.
+const MOST_POINTS: usize = 3 * MOST_PARTS + 1;
+
+/// The boxes of `side` x `side` equal parts (1, 2 or 4 a side) of a rectangle of a regular patch: each around the part's
+/// Bézier points. Those of the rectangle are halved, so that parts share what they have in common.
+pub(super) struct GridHulls<'a> {
+    pub control: &'a ControlPoints,
+    /// Of the rectangle.
+    pub u: &'a BezierWeights,
+    pub v: &'a BezierWeights,
+    pub side: usize,
+    /// Box of part (a, b) at `MOST_PARTS * b + a`: [low, high].
+    pub out: &'a mut [[Point; 2]; MOST_PARTS * MOST_PARTS],
+}
+
+/// The Bézier points of `side` equal parts of a segment, from its B-spline points.
+#[inline(always)]
+fn split_points<K: Kernel>(k: K, weights: &BezierWeights, c: [K::D; 4], side: usize) -> [K::D; MOST_POINTS] {
+    let mut out = [k.splat4(0.0); MOST_POINTS];
+    for (p, weights) in out.iter_mut().zip(weights) {
+        *p = combine_lanes(k, weights, c);
+    }
+    if side >= 2 {
+        let [low, high] = halves(k, [out[0], out[1], out[2], out[3]]);
+        let halves = if side == 2 { [low, high, high, high] } else { quarters(k, low, high) };
+        for (i, part) in halves.iter().enumerate().take(side) {
+            (out[3 * i], out[3 * i + 1], out[3 * i + 2], out[3 * i + 3]) = (part[0], part[1], part[2], part[3]);
+        }
+    }
+    out
+}
+
+/// The halves of halves.
+#[inline(always)]
+fn quarters<K: Kernel>(k: K, low: [K::D; 4], high: [K::D; 4]) -> [[K::D; 4]; 4] {
+    let ([a, b], [c, d]) = (halves(k, low), halves(k, high));
+    [a, b, c, d]
+}
+
+/// Both halves of a Bézier curve (de Casteljau).
+#[inline(always)]
+fn halves<K: Kernel>(k: K, [a, b, c, d]: [K::D; 4]) -> [[K::D; 4]; 2] {
+    let (ab, bc, cd) = (middle(k, a, b), middle(k, b, c), middle(k, c, d));
+    let (abc, bcd) = (middle(k, ab, bc), middle(k, bc, cd));
+    let m = middle(k, abc, bcd);
+    [[a, ab, abc, m], [m, bcd, cd, d]]
+}
+
+#[inline(always)]
+fn middle<K: Kernel>(k: K, a: K::D, b: K::D) -> K::D {
+    k.mul4(k.add4(a, b), k.splat4(0.5))
+}
+
+impl Task for GridHulls<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) {
+        let Self { control: c, u, v, side, out } = self;
+        let mut columns = [[k.splat4(0.0); MOST_POINTS]; 4];
+        for (i, column) in columns.iter_mut().enumerate() {
+            let c = [k.load4(&c[i].0), k.load4(&c[4 + i].0), k.load4(&c[8 + i].0), k.load4(&c[12 + i].0)];
+            *column = split_points(k, v, c, side);
+        }
+        *out = [[Point([f64::INFINITY; 4]), Point([f64::NEG_INFINITY; 4])]; MOST_PARTS * MOST_PARTS];
+        for j in 0..=3 * side {
+            let row = split_points(k, u, [columns[0][j], columns[1][j], columns[2][j], columns[3][j]], side);
+            for a in 0..side {
+                let [p, q, r, s] = [row[3 * a], row[3 * a + 1], row[3 * a + 2], row[3 * a + 3]];
+                let low = k.min4(k.min4(p, q), k.min4(r, s));
+                let high = k.max4(k.max4(p, q), k.max4(r, s));
+                // A row between two parts belongs to both.
+                for b in (j.max(1) - 1) / 3..=(j / 3).min(side - 1) {
+                    let [l, h] = &mut out[MOST_PARTS * b + a];
+                    (l.0, h.0) = (k.store4(k.min4(k.load4(&l.0), low)), k.store4(k.max4(k.load4(&h.0), high)));
+                }
+            }
+        }
     }
 }
 
@@ -309,6 +401,24 @@ mod tests {
         let expected = run(Hull { control: &c, u: &whole, v: &whole });
         let hull = run(WholeHull { control: &c });
         assert!((0..2).all(|k| (hull[k] - expected[k]).max_abs() < 1e-14), "{hull:?} {expected:?}");
+    }
+
+    #[test]
+    fn the_boxes_of_a_grid_are_those_of_its_parts() {
+        let c = control_points();
+        for (side, u, v) in [(1, [0.0, 1.0], [0.25, 0.5]), (2, [0.5, 0.75], [0.0, 1.0]), (4, [0.0, 1.0], [0.0, 0.5])] {
+            let mut out = [[Point::ZERO; 2]; MOST_PARTS * MOST_PARTS];
+            run(GridHulls { control: &c, u: &bezier_weights(u), v: &bezier_weights(v), side, out: &mut out });
+            for (a, b) in (0..side).flat_map(|b| (0..side).map(move |a| (a, b))) {
+                let part = |[low, high]: [f64; 2], i: usize| {
+                    let step = (high - low) / side as f64;
+                    bezier_weights([low + step * i as f64, low + step * (i + 1) as f64])
+                };
+                let expected = run(Hull { control: &c, u: &part(u, a), v: &part(v, b) });
+                let hull = out[MOST_PARTS * b + a];
+                assert!((0..2).all(|k| (hull[k] - expected[k]).max_abs() < 1e-14), "{side} {a} {b}: {hull:?} {expected:?}");
+            }
+        }
     }
 
     #[test]

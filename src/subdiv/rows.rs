@@ -114,6 +114,13 @@ pub trait Index: Copy {
     fn idx(self) -> usize;
 }
 
+impl Index for u8 {
+    #[inline(always)]
+    fn idx(self) -> usize {
+        usize::from(self)
+    }
+}
+
 impl Index for u16 {
     #[inline(always)]
     fn idx(self) -> usize {

@@ -1,5 +1,6 @@
 //! One mesh ready for evaluation: topology, control points in lattice units, and the plan of every face.
 
+use super::bounds::GridBoxes;
 use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, sample_regular};
 use super::local::RingWalker;
@@ -366,6 +367,26 @@ impl Surface {
         } else {
             evaluator.parts_bounds(&self.plans, &mut points.parts, u, v, depth)
         }
+    }
+}
+
+impl Surface {
+    /// The boxes of `side` x `side` equal parts of a rectangle of parameters, in lattice units, where they can be had
+    /// together; see `Evaluator::grid_of_parts`. Returns whether that is so.
+    pub(super) fn grid_boxes(
+        &self,
+        points: &mut PatchPoints,
+        evaluator: &mut Evaluator,
+        rectangle: [[f64; 2]; 2],
+        side: usize,
+        depth: u32,
+        out: &mut GridBoxes,
+    ) -> bool {
+        if points.node == REGULAR {
+            evaluator.regular_grid_boxes(&points.control, rectangle, side, out);
+            return true;
+        }
+        points.node != EDITED && evaluator.grid_of_parts(&self.plans, &mut points.parts, rectangle, side, depth, out)
     }
 }
 
