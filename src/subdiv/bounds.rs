@@ -5,7 +5,7 @@ use super::parts::Parts;
 use super::plan::{NodeId, Plan, PlanLibrary, Step};
 use super::pole::{self, PoleHull};
 use super::products::control_points;
-use super::regular::{self, BezierWeights, ControlPoints, MOST_PARTS, bezier_weights};
+use super::regular::{self, BezierWeights, ControlPoints, GridHulls, MOST_PARTS, bezier_weights};
 use super::rows::Width;
 use crate::math::DBounds;
 use crate::math::simd;
@@ -203,12 +203,7 @@ impl Evaluator {
             return true;
         }
         if let Some(control) = parts.control(part) {
-            let mut boxes = [[Point::ZERO; 2]; MOST_PARTS * MOST_PARTS];
-            self.regular_grid_boxes(control, [u, v], side, &mut boxes);
-            for row in 0..side {
-                let at = MOST_PARTS * row;
-                out[first + at..][..side].copy_from_slice(&boxes[at..][..side]);
-            }
+            self.regular_grid_boxes(control, [u, v], side, &mut out[first..]);
             return true;
         }
         let Some(quarters) = parts.quarters(library, part) else { return false };
@@ -228,16 +223,20 @@ impl Evaluator {
         is_inside && self.bound_grid(library, parts, quarters + k, [u, v], side, below, first, out)
     }
 
-    /// As [`grid_of_parts`](Self::grid_of_parts) for 16 control points, and any rectangle.
+    /// As [`grid_of_parts`](Self::grid_of_parts) for 16 control points, any rectangle, and two or four parts a side.
     pub(super) fn regular_grid_boxes(
         &mut self,
         control: &ControlPoints,
         [u, v]: [[f64; 2]; 2],
         side: usize,
-        out: &mut GridBoxes,
+        out: &mut [[Point; 2]],
     ) {
         let [of_u, of_v] = &mut self.hulls;
-        simd::run(regular::GridHulls { control, u: of_u.get(u), v: of_v.get(v), side, out });
+        let (u, v) = (of_u.get(u), of_v.get(v));
+        match side {
+            2 => simd::run(GridHulls::<2> { control, u, v, out }),
+            _ => simd::run(GridHulls::<4> { control, u, v, out }),
+        }
     }
 }
 

@@ -258,34 +258,32 @@ impl Task for WholeHull<'_> {
 /// Parts along a side that [`GridHulls`] has at most.
 pub(super) const MOST_PARTS: usize = 4;
 
-/// Bézier points along a side of that many parts, ends shared.
-const MOST_POINTS: usize = 3 * MOST_PARTS + 1;
-
-/// The boxes of `side` x `side` equal parts (1, 2 or 4 a side) of a rectangle of a regular patch: each around the part's
+/// The boxes of `SIDE` x `SIDE` equal parts (2 or 4 a side) of a rectangle of a regular patch: each around the part's
 /// Bézier points. Those of the rectangle are halved, so that parts share what they have in common.
-pub(super) struct GridHulls<'a> {
+pub(super) struct GridHulls<'a, const SIDE: usize> {
     pub control: &'a ControlPoints,
     /// Of the rectangle.
     pub u: &'a BezierWeights,
     pub v: &'a BezierWeights,
-    pub side: usize,
     /// Box of part (a, b) at `MOST_PARTS * b + a`: [low, high].
-    pub out: &'a mut [[Point; 2]; MOST_PARTS * MOST_PARTS],
+    pub out: &'a mut [[Point; 2]],
 }
 
-/// The Bézier points of `side` equal parts of a segment, from its B-spline points.
+/// The Bézier points of `SIDE` equal parts of a segment, from its B-spline points.
 #[inline(always)]
-fn split_points<K: Kernel>(k: K, weights: &BezierWeights, c: [K::D; 4], side: usize) -> [K::D; MOST_POINTS] {
-    let mut out = [k.splat4(0.0); MOST_POINTS];
-    for (p, weights) in out.iter_mut().zip(weights) {
-        *p = combine_lanes(k, weights, c);
-    }
-    if side >= 2 {
-        let [low, high] = halves(k, [out[0], out[1], out[2], out[3]]);
-        let halves = if side == 2 { [low, high, high, high] } else { quarters(k, low, high) };
-        for (i, part) in halves.iter().enumerate().take(side) {
-            (out[3 * i], out[3 * i + 1], out[3 * i + 2], out[3 * i + 3]) = (part[0], part[1], part[2], part[3]);
-        }
+fn split_points<K: Kernel, const SIDE: usize>(k: K, weights: &BezierWeights, c: [K::D; 4]) -> [[K::D; 4]; SIDE] {
+    let whole = [
+        combine_lanes(k, &weights[0], c),
+        combine_lanes(k, &weights[1], c),
+        combine_lanes(k, &weights[2], c),
+        combine_lanes(k, &weights[3], c),
+    ];
+    let [low, high] = halves(k, whole);
+    let mut out = [high; SIDE];
+    if SIDE == 2 {
+        out[0] = low;
+    } else {
+        out.copy_from_slice(&quarters(k, low, high));
     }
     out
 }
@@ -311,29 +309,48 @@ fn middle<K: Kernel>(k: K, a: K::D, b: K::D) -> K::D {
     k.mul4(k.add4(a, b), k.splat4(0.5))
 }
 
-impl Task for GridHulls<'_> {
+/// The boxes around four points in a row, for each of `SIDE` parts.
+#[inline(always)]
+fn row_boxes<K: Kernel, const SIDE: usize>(k: K, u: &BezierWeights, points: [K::D; 4]) -> [[K::D; 2]; SIDE] {
+    let mut out = [[points[0]; 2]; SIDE];
+    for (out, [p, q, r, s]) in out.iter_mut().zip(split_points::<K, SIDE>(k, u, points)) {
+        *out = [k.min4(k.min4(p, q), k.min4(r, s)), k.max4(k.max4(p, q), k.max4(r, s))];
+    }
+    out
+}
+
+#[inline(always)]
+fn union_of_boxes<K: Kernel, const SIDE: usize>(k: K, a: &mut [[K::D; 2]; SIDE], b: &[[K::D; 2]; SIDE]) {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a = [k.min4(a[0], b[0]), k.max4(a[1], b[1])];
+    }
+}
+
+impl<const SIDE: usize> Task for GridHulls<'_, SIDE> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) {
-        let Self { control: c, u, v, side, out } = self;
-        let mut columns = [[k.splat4(0.0); MOST_POINTS]; 4];
+        let Self { control: c, u, v, out } = self;
+        let mut columns = [[[k.splat4(0.0); 4]; SIDE]; 4];
         for (i, column) in columns.iter_mut().enumerate() {
             let c = [k.load4(&c[i].0), k.load4(&c[4 + i].0), k.load4(&c[8 + i].0), k.load4(&c[12 + i].0)];
-            *column = split_points(k, v, c, side);
+            *column = split_points::<K, SIDE>(k, v, c);
         }
-        *out = [[Point([f64::INFINITY; 4]), Point([f64::NEG_INFINITY; 4])]; MOST_PARTS * MOST_PARTS];
-        for j in 0..=3 * side {
-            let row = split_points(k, u, [columns[0][j], columns[1][j], columns[2][j], columns[3][j]], side);
-            for a in 0..side {
-                let [p, q, r, s] = [row[3 * a], row[3 * a + 1], row[3 * a + 2], row[3 * a + 3]];
-                let low = k.min4(k.min4(p, q), k.min4(r, s));
-                let high = k.max4(k.max4(p, q), k.max4(r, s));
-                // A row between two parts belongs to both.
-                for b in (j.max(1) - 1) / 3..=(j / 3).min(side - 1) {
-                    let [l, h] = &mut out[MOST_PARTS * b + a];
-                    (l.0, h.0) = (k.store4(k.min4(k.load4(&l.0), low)), k.store4(k.max4(k.load4(&h.0), high)));
-                }
+        let [c0, c1, c2, c3] = &columns;
+        // The last row of one part is the first of the next one.
+        let mut first = row_boxes::<K, SIDE>(k, u, [c0[0][0], c1[0][0], c2[0][0], c3[0][0]]);
+        for b in 0..SIDE {
+            let last = row_boxes::<K, SIDE>(k, u, [c0[b][3], c1[b][3], c2[b][3], c3[b][3]]);
+            let mut boxes = first;
+            union_of_boxes(k, &mut boxes, &last);
+            for j in 1..3 {
+                let row = row_boxes::<K, SIDE>(k, u, [c0[b][j], c1[b][j], c2[b][j], c3[b][j]]);
+                union_of_boxes(k, &mut boxes, &row);
             }
+            for (out, [low, high]) in out[MOST_PARTS * b..].iter_mut().zip(boxes) {
+                *out = [Point(k.store4(low)), Point(k.store4(high))];
+            }
+            first = last;
         }
     }
 }
@@ -406,9 +423,13 @@ mod tests {
     #[test]
     fn the_boxes_of_a_grid_are_those_of_its_parts() {
         let c = control_points();
-        for (side, u, v) in [(1, [0.0, 1.0], [0.25, 0.5]), (2, [0.5, 0.75], [0.0, 1.0]), (4, [0.0, 1.0], [0.0, 0.5])] {
+        for (side, u, v) in [(2, [0.5, 0.75], [0.0, 1.0]), (4, [0.0, 1.0], [0.0, 0.5])] {
             let mut out = [[Point::ZERO; 2]; MOST_PARTS * MOST_PARTS];
-            run(GridHulls { control: &c, u: &bezier_weights(u), v: &bezier_weights(v), side, out: &mut out });
+            let (control, of_u, of_v, boxes) = (&c, &bezier_weights(u), &bezier_weights(v), &mut out[..]);
+            match side {
+                2 => run(GridHulls::<2> { control, u: of_u, v: of_v, out: boxes }),
+                _ => run(GridHulls::<4> { control, u: of_u, v: of_v, out: boxes }),
+            }
             for (a, b) in (0..side).flat_map(|b| (0..side).map(move |a| (a, b))) {
                 let part = |[low, high]: [f64; 2], i: usize| {
                     let step = (high - low) / side as f64;

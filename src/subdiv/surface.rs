@@ -276,8 +276,9 @@ impl Surface {
         let (first, size) = self.topology.face_corners(face.0);
         points.node = self.plan_of_face[face.idx()];
         if points.node == REGULAR {
-            let vertices = regular_ring(&self.topology, first).expect("the plan says so");
-            points.control = vertices.map(|v| self.control_point(v));
+            for (point, vertex) in points.control.iter_mut().zip(known_regular_ring(&self.topology, first)) {
+                *point = self.control_point(vertex);
+            }
             return;
         }
         if points.node == EDITED {
@@ -403,6 +404,32 @@ fn patch_of(faces_of_patches: Option<&FaceIndex>, face: FaceId, sub: u32) -> Pat
     PatchId(faces_of_patches.map_or(face.0, |index| index.corners(face.0).0) + sub)
 }
 
+/// Where in a regular ring the vertices at corner `k` go: itself, then across its edge and on counter-clockwise.
+const CORNER_PLACES: [[u8; 4]; 4] = [[5, 1, 2, 0], [6, 7, 11, 3], [10, 14, 13, 15], [9, 8, 4, 12]];
+
+/// [`regular_ring`] of a face that has one.
+fn known_regular_ring(topology: &Topology, first: u32) -> [u32; 16] {
+    let mut out = [0; 16];
+    for (h, places) in (first..).zip(CORNER_PLACES) {
+        // All faces are quads, so that their half-edges are found by their first ones.
+        let across = topology.twin(h);
+        let start = topology.corners_at(across).0;
+        let left = (across - start) ^ 2;
+        let diagonal = topology.twin(start + (across - start + 1) % 4);
+        let beyond = topology.corners_at(diagonal).0;
+        let vertices = [
+            topology.vertex(h),
+            topology.vertex(start + left),
+            topology.vertex(start + (left + 1) % 4),
+            topology.vertex(beyond + (diagonal - beyond + 3) % 4),
+        ];
+        for (place, vertex) in places.into_iter().zip(vertices) {
+            out[usize::from(place)] = vertex;
+        }
+    }
+    out
+}
+
 /// The 16 vertices around an untagged quad with regular corners, u fastest, by plain hops; `None` for other faces.
 fn regular_ring(topology: &Topology, first: u32) -> Option<[u32; 16]> {
     if topology.face_corners(topology.face(first)).1 != 4 {
@@ -499,4 +526,27 @@ fn plan_face(
     ring.mesh.key(key);
     let known = library.read().find(key);
     known.unwrap_or_else(|| library.write().node(&ring.mesh)).turned(turn)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::random::random_mesh;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn known_regular_rings_are_regular_rings() {
+        let mut n_regular = 0;
+        for mesh in shapes::all().into_iter().map(|(_, mesh)| mesh).chain((0..100).map(random_mesh)) {
+            let topology = Topology::new(&mesh, 1);
+            for face in 0..topology.n_faces() as u32 {
+                let first = topology.face_corners(face).0;
+                if let Some(ring) = regular_ring(&topology, first) {
+                    assert_eq!(known_regular_ring(&topology, first), ring);
+                    n_regular += 1;
+                }
+            }
+        }
+        assert!(n_regular > 100, "{n_regular} faces were regular");
+    }
 }
