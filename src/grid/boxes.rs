@@ -65,6 +65,9 @@ pub(super) struct LaneBoxes {
 }
 
 impl LaneBoxes {
+    /// To be overwritten.
+    pub const UNSET: Self = Self { low: [[0; 16]; 3], high: [[0; 16]; 3] };
+
     /// The same box in every lane.
     pub fn splat(b: IntegerBox) -> Self {
         Self { low: b[0].map(|x| [x; 16]), high: b[1].map(|x| [x; 16]) }
@@ -95,33 +98,30 @@ fn step_exponent(extent: u32) -> u32 {
 }
 
 impl Head {
-    /// A head whose lane k, for every bit k of `lane_mask(lanes)`, has the box k of `boxes`; the others are not looked at.
-    /// `whole` is the box around them all, with coordinates up to 2^24.
+    /// Makes a head whose lane k, for every bit k of `lane_mask(lanes)`, has the box k of `boxes`; the others are not looked at.
+    /// `whole` is the box around them all, with coordinates up to 2^24. Each field is written where it stays.
     #[inline(always)]
-    pub fn new(
+    pub fn set(
+        &mut self,
         whole: IntegerBox,
         boxes: &LaneBoxes,
         lanes: [u8; 2],
         cells: CellRect,
         grid: [u16; 2],
         format: u8,
-    ) -> Self {
-        let mut planes = [[0; 16]; 6];
-        let mut exponents = [0; 3];
+    ) {
         for k in 0..3 {
             let base = whole[0][k];
             let exponent = step_exponent((whole[1][k] - base) as u32);
             let up = (1u32 << exponent) - 1;
             // Lanes that are not used may wrap around: they are masked after every test.
-            for (plane, low) in planes[k].iter_mut().zip(&boxes.low[k]) {
-                *plane = ((low.wrapping_sub(base) as u32) >> exponent) as u8;
-            }
-            for (plane, high) in planes[k + 3].iter_mut().zip(&boxes.high[k]) {
-                *plane = ((high.wrapping_sub(base) as u32).wrapping_add(up) >> exponent) as u8;
-            }
-            exponents[k] = exponent as u8;
+            self.planes[k] = boxes.low[k].map(|low| ((low.wrapping_sub(base) as u32) >> exponent) as u8);
+            self.planes[k + 3] =
+                boxes.high[k].map(|high| ((high.wrapping_sub(base) as u32).wrapping_add(up) >> exponent) as u8);
+            self.exponent[k] = exponent as u8;
         }
-        Self { base: whole[0], exponent: exponents, format, lanes, padding: [0; 2], cells, grid, planes }
+        (self.base, self.format, self.lanes, self.padding) = (whole[0], format, lanes, [0; 2]);
+        (self.cells, self.grid) = (cells, grid);
     }
 
     /// Makes the lane's box one that no ray meets: along the ray's longest axis it is left 255 planes before it is entered,

@@ -48,9 +48,9 @@ fn encode(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &mut [u8])
     for (c, b) in bounds.iter().enumerate().filter(|c| !c.1.is_empty()) {
         boxes.set(lane(c), integer_box(b));
     }
-    let mut head = Head::new(whole, &boxes, children, cells, [0; 2], NO_FORMAT);
+    let head: &mut Head = bytemuck::from_bytes_mut(out);
+    head.set(whole, &boxes, children, cells, [0; 2], NO_FORMAT);
     (0..bounds.len()).filter(|&c| bounds[c].is_empty()).for_each(|c| head.turn_inside_out(lane(c)));
-    out.copy_from_slice(bytemuck::bytes_of(&head));
 }
 
 /// The box rounded outwards to lattice points, and cut to the cube that vertices lie in.

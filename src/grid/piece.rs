@@ -73,10 +73,14 @@ impl PieceLayout {
     pub fn new(vertices: &LatticeGrid, cells: CellRect, grid: [u16; 2]) -> Self {
         let [n_u, n_v] = cells.size();
         debug_assert!((1..=MAX_CELLS).contains(&n_u) && (1..=MAX_CELLS).contains(&n_v));
-        assert_eq!(vertices.size(), [n_u + 1, n_v + 1], "a piece of {n_u} x {n_v} cells");
-        let (whole, boxes) = simd::run(BlockBoxes { vertices, lanes: lanes(cells) });
+        // Numbers one by one: both at once would wait for their stores.
+        let [columns, rows] = vertices.size();
+        assert!(columns == n_u + 1 && rows == n_v + 1, "a piece of {n_u} x {n_v} cells");
+        let mut layout = Self { cells, grid, whole: [[0; 3]; 2], boxes: LaneBoxes::UNSET, format: VertexFormat::Four };
+        let whole = simd::run(BlockBoxes { vertices, lanes: lanes(cells), boxes: &mut layout.boxes });
         let extent = (0..3).map(|k| (whole[1][k] - whole[0][k]) as u32).max().unwrap_or(0);
-        Self { cells, grid, whole, boxes, format: VertexFormat::for_extent(extent) }
+        (layout.whole, layout.format) = (whole, VertexFormat::for_extent(extent));
+        layout
     }
 
     /// Exact size of the block, a multiple of 64: 640 at 8x8 cells and 16 bits (5 bytes a triangle), 896 at 24 bits (7).
@@ -90,7 +94,7 @@ impl PieceLayout {
         self.format
     }
 
-    /// Writes the block. `vertices` are those of [`Self::new`]; `out` is [`Self::bytes`] long.
+    /// Writes the block. `vertices` are those of [`Self::new`]; `out` is [`Self::bytes`] long and aligned to 4 bytes at least.
     #[inline]
     pub fn encode(&self, vertices: &LatticeGrid, out: &mut [u8]) {
         assert_eq!(out.len(), self.bytes(), "room for a piece");
@@ -104,47 +108,61 @@ fn lanes(cells: CellRect) -> [u8; 2] {
     cells.size().map(|n| n.div_ceil(2) as u8)
 }
 
-/// The box around a piece's vertices, and those around its blocks'.
+/// Finds the box around a piece's vertices, and those around its blocks'.
 struct BlockBoxes<'a> {
     vertices: &'a LatticeGrid,
     lanes: [u8; 2],
+    boxes: &'a mut LaneBoxes,
 }
 
-// Vertices beyond the last column or row are those of the last: cells there have no area, and are never hit.
+// Vertices beyond the last column or row are those of the last: cells there have no area, and are never hit. So rows of
+// blocks are always taken in twos.
 impl Task for BlockBoxes<'_> {
-    type Output = (IntegerBox, LaneBoxes);
+    type Output = IntegerBox;
     #[inline(always)]
-    fn run<K: Kernel>(self, k: K) -> (IntegerBox, LaneBoxes) {
+    fn run<K: Kernel>(self, k: K) -> IntegerBox {
         let [n_a, n_b] = self.lanes.map(usize::from);
         let last_row = self.vertices.size()[1] - 1;
-        let mut boxes = LaneBoxes { low: [[0; 16]; 3], high: [[0; 16]; 3] };
-        let [mut lowest, mut highest] = [[i32::MAX; 3], [i32::MIN; 3]];
+        let mut whole = [[0; 3]; 2];
         for axis in 0..3 {
             let row = |j: usize| self.vertices.window(axis, j.min(last_row));
-            let (mut below_low, mut below_high) = min_max_of_threes(k, row(0));
-            for b in 0..n_b {
-                let (low_1, high_1) = min_max_of_threes(k, row(2 * b + 1));
-                let (low_2, high_2) = min_max_of_threes(k, row(2 * b + 2));
-                let low = k.even_lanes(k.min_i(k.min_i(below_low, low_1), low_2));
-                let high = k.even_lanes(k.max_i(k.max_i(below_high, high_1), high_2));
-                (below_low, below_high) = (low_2, high_2);
-                boxes.low[axis][4 * b..4 * b + 4].copy_from_slice(&low);
-                boxes.high[axis][4 * b..4 * b + 4].copy_from_slice(&high);
-                for a in 0..n_a {
-                    lowest[axis] = lowest[axis].min(low[a]);
-                    highest[axis] = highest[axis].max(high[a]);
-                }
+            let mut below = min_max_of_threes(k, row(0));
+            let mut of_all = [k.splat_i(i32::MAX), k.splat_i(i32::MIN)];
+            for two in 0..n_b.div_ceil(2) {
+                let j = 4 * two;
+                let at_middle = min_max_of_threes(k, row(j + 2));
+                let above = min_max_of_threes(k, row(j + 4));
+                let first = of_three(k, below, min_max_of_threes(k, row(j + 1)), at_middle);
+                let second = of_three(k, at_middle, min_max_of_threes(k, row(j + 3)), above);
+                let [low, high] = [k.even_lanes(first[0], second[0]), k.even_lanes(first[1], second[1])];
+                self.boxes.low[axis][8 * two..8 * two + 8].copy_from_slice(&k.store_i(low));
+                self.boxes.high[axis][8 * two..8 * two + 8].copy_from_slice(&k.store_i(high));
+                of_all = [k.min_i(of_all[0], low), k.max_i(of_all[1], high)];
+                below = above;
+            }
+            // Lanes beyond the last block of a row hold what they may.
+            let (low, high) = (k.store_i(of_all[0]), k.store_i(of_all[1]));
+            (whole[0][axis], whole[1][axis]) = (low[0], high[0]);
+            for lane in 0..n_a {
+                whole[0][axis] = whole[0][axis].min(low[lane].min(low[4 + lane]));
+                whole[1][axis] = whole[1][axis].max(high[lane].max(high[4 + lane]));
             }
         }
-        ([lowest, highest], boxes)
+        whole
     }
+}
+
+/// The least and the greatest of three rows.
+#[inline(always)]
+fn of_three<K: Kernel>(k: K, a: [K::I; 2], b: [K::I; 2], c: [K::I; 2]) -> [K::I; 2] {
+    [k.min_i(k.min_i(a[0], b[0]), c[0]), k.max_i(k.max_i(a[1], b[1]), c[1])]
 }
 
 /// The least and the greatest of each three numbers of a row that follow each other, from the first eight on.
 #[inline(always)]
-fn min_max_of_threes<K: Kernel>(k: K, row: &[i32; WINDOW]) -> (K::I, K::I) {
+fn min_max_of_threes<K: Kernel>(k: K, row: &[i32; WINDOW]) -> [K::I; 2] {
     let [a, b, c] = [eight(k, row, 0), eight(k, row, 1), eight(k, row, 2)];
-    (k.min_i(k.min_i(a, b), c), k.max_i(k.max_i(a, b), c))
+    [k.min_i(k.min_i(a, b), c), k.max_i(k.max_i(a, b), c)]
 }
 
 /// Eight numbers of a row.
@@ -165,8 +183,8 @@ impl Task for Encode<'_> {
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) {
         let Self { layout: PieceLayout { cells, grid, whole, boxes, format }, vertices, out } = self;
-        let head = Head::new(*whole, boxes, lanes(*cells), *cells, *grid, *format as u8);
-        out[..HEAD_BYTES].copy_from_slice(bytemuck::bytes_of(&head));
+        let head: &mut Head = bytemuck::from_bytes_mut(&mut out[..HEAD_BYTES]);
+        head.set(*whole, boxes, lanes(*cells), *cells, *grid, *format as u8);
         match format {
             VertexFormat::Two => write_rows::<2, K>(k, vertices, whole[0], lanes(*cells), out),
             VertexFormat::Three => write_rows::<3, K>(k, vertices, whole[0], lanes(*cells), out),
@@ -185,36 +203,71 @@ fn write_rows<const BYTES: usize, K: Kernel>(
     out: &mut [u8],
 ) {
     let [columns, n_rows] = lanes.map(|n| 2 * usize::from(n) + 1);
+    let rows = &mut out[HEAD_BYTES..];
+    // What is written after a row is replaced by the next one, and comes to lie in the tail after the last.
+    let has_room = BYTES * columns + TAIL_BYTES >= spread_bytes(BYTES);
+    match columns {
+        9 if BYTES < 4 => write_wide_rows::<BYTES, true, K>(k, vertices, low, [columns, n_rows], rows),
+        _ if BYTES < 4 && has_room => write_wide_rows::<BYTES, false, K>(k, vertices, low, [columns, n_rows], rows),
+        _ => write_plain_rows::<BYTES>(vertices, low, [columns, n_rows], rows),
+    }
+    rows[3 * BYTES * columns * n_rows..].fill(0);
+}
+
+/// Bytes that are written for eight numbers.
+const fn spread_bytes(bytes: usize) -> usize {
+    if bytes == 2 { 16 } else { 28 }
+}
+
+/// Eight numbers of a row at a time, and where it has `NINE` columns the ninth.
+#[inline(always)]
+fn write_wide_rows<const BYTES: usize, const NINE: bool, K: Kernel>(
+    k: K,
+    vertices: &LatticeGrid,
+    low: [i32; 3],
+    [columns, n_rows]: [usize; 2],
+    out: &mut [u8],
+) {
     let last_row = vertices.size()[1] - 1;
-    let mut at = HEAD_BYTES;
+    let [low_x, low_y, low_z] = low;
+    let mut at = 0;
     for j in 0..n_rows {
-        for (axis, &low) in low.iter().enumerate() {
+        for (axis, low) in [(0, low_x), (1, low_y), (2, low_z)] {
             let row = vertices.window(axis, j.min(last_row));
+            let place = &mut out[at..at + spread_bytes(BYTES) + if NINE && BYTES == 2 { 2 } else { 0 }];
+            let eight = k.sub_i(eight(k, row, 0), k.splat_i(low));
             if BYTES == 2 {
-                write_narrow_row(k, row, low, columns, &mut out[at..]);
+                place[..16].copy_from_slice(bytemuck::cast_slice(&k.lower_halves(eight).map(u16::to_le)));
             } else {
-                for (x, place) in row[..columns].iter().zip(out[at..].chunks_exact_mut(BYTES)) {
-                    place.copy_from_slice(&x.wrapping_sub(low).to_le_bytes()[..BYTES]);
-                }
+                let [first, second] = k.lower_threes(eight);
+                place[..16].copy_from_slice(&first);
+                place[12..28].copy_from_slice(&second);
+            }
+            if NINE {
+                let ninth = row[8].wrapping_sub(low).to_le_bytes();
+                place[8 * BYTES..9 * BYTES].copy_from_slice(&ninth[..BYTES]);
             }
             at += BYTES * columns;
         }
     }
-    out[at..].fill(0);
 }
 
-/// Writes the first `columns` numbers, up to nine, as offsets from `low` in two bytes, and where there is room what comes
-/// after them: the next row will replace it.
-#[inline(always)]
-fn write_narrow_row<K: Kernel>(k: K, row: &[i32; WINDOW], low: i32, columns: usize, out: &mut [u8]) {
-    let narrow = k.lower_halves(k.sub_i(eight(k, row, 0), k.splat_i(low))).map(u16::to_le);
-    let bytes: &[u8; 16] = bytemuck::cast_ref(&narrow);
-    match out.first_chunk_mut() {
-        Some(whole) => *whole = *bytes,
-        None => out[..2 * columns].copy_from_slice(&bytes[..2 * columns]),
-    }
-    if columns > 8 {
-        out[16..18].copy_from_slice(&(row[8].wrapping_sub(low) as u16).to_le_bytes());
+/// One number after the other.
+#[inline(never)]
+fn write_plain_rows<const BYTES: usize>(
+    vertices: &LatticeGrid,
+    low: [i32; 3],
+    [columns, n_rows]: [usize; 2],
+    out: &mut [u8],
+) {
+    let last_row = vertices.size()[1] - 1;
+    let mut places = out.chunks_exact_mut(BYTES);
+    for j in 0..n_rows {
+        for (axis, low) in low.iter().enumerate() {
+            for (x, place) in vertices.window(axis, j.min(last_row))[..columns].iter().zip(&mut places) {
+                place.copy_from_slice(&x.wrapping_sub(*low).to_le_bytes()[..BYTES]);
+            }
+        }
     }
 }
 

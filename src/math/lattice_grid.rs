@@ -115,22 +115,37 @@ impl Task for Near<'_> {
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) -> u32 {
         let Self { points, rounding: Rounding { shift, guard }, first, step, n } = self;
-        let (shift, low, high) = (k.splat4(shift + 0.5), k.splat4(guard), k.splat4(1.0 - guard));
+        let shift = k.splat4(shift + 0.5);
+        let [xs, ys, zs] = [0, 1, 2].map(|axis| &points.axis(axis)[first..]);
         let mut mask = 0;
-        for axis in 0..3 {
-            let numbers = &points.axis(axis)[first..];
-            for i in (0..n).step_by(LANES) {
-                let mut four = [0.0; LANES];
-                for (lane, x) in four.iter_mut().enumerate() {
-                    *x = numbers[(i + lane).min(n - 1) * step];
-                }
-                let shifted = k.add4(k.load4(&four), shift);
-                let fraction = k.sub4(shifted, k.floor4(shifted));
-                mask |= (k.lt4(fraction, low) | k.lt4(high, fraction)) << i;
-            }
+        for i in (0..n).step_by(LANES) {
+            let x = fraction(k, k.add4(four(k, xs, i, n, step), shift));
+            let y = fraction(k, k.add4(four(k, ys, i, n, step), shift));
+            let z = fraction(k, k.add4(four(k, zs, i, n, step), shift));
+            let (least, most) = (k.min4(k.min4(x, y), z), k.max4(k.max4(x, y), z));
+            mask |= (k.lt4(least, k.splat4(guard)) | k.lt4(k.splat4(1.0 - guard), most)) << i;
         }
         mask & (u32::MAX >> (MOST_NEAR - n))
     }
+}
+
+/// What is above the next lower whole number.
+#[inline(always)]
+fn fraction<K: Kernel>(k: K, x: K::D) -> K::D {
+    k.sub4(x, k.floor4(x))
+}
+
+/// Four numbers from the `i`-th on, `step` apart; in place of those from the `n`-th on, the last one, or what comes after
+/// it if that can be loaded at once.
+#[inline(always)]
+fn four<K: Kernel>(k: K, numbers: &[f64], i: usize, n: usize, step: usize) -> K::D {
+    if step == 1
+        && let Some(four) = numbers[i..].first_chunk()
+    {
+        return k.load4(four);
+    }
+    let at = |lane: usize| numbers[(i + lane).min(n - 1) * step];
+    k.load4(&[at(0), at(1), at(2), at(3)])
 }
 
 struct Round<'a> {

@@ -242,7 +242,9 @@ impl Evaluator {
 
 /// The box around a whole pole, if the node is one that has no more points than there is room for.
 fn pole_hull(library: &PlanLibrary, node: NodeId, ring: &[Point], depth: u32) -> Option<[Point; 2]> {
-    let Plan::Split { step: Step { pole: Some(order), .. }, in_hull: true, .. } = library.plan(node) else { return None };
+    let Plan::Split { step: Step { pole: Some(order), .. }, in_hull: true, .. } = library.plan(node) else {
+        return None;
+    };
     if depth == 0 || order.len() > pole::MOST_POINTS {
         return None;
     }

@@ -190,6 +190,13 @@ pub fn snapped(i: u32, n: u32, rate: u32) -> u32 {
     ((2 * u64::from(i) * u64::from(rate) + u64::from(n)) / (2 * u64::from(n))) as u32
 }
 
+/// `i / n` for all i from the first to the last. Dividing by a power of two is multiplying, which takes a quarter of the time.
+fn parameters([first, last]: [u32; 2], n: u32) -> impl Iterator<Item = f64> {
+    let is_exact = n.is_power_of_two();
+    let (n, step) = (f64::from(n), 1.0 / f64::from(n));
+    (first..=last).map(move |i| if is_exact { f64::from(i) * step } else { f64::from(i) / n })
+}
+
 impl Dicer {
     /// The lattice vertices `i0..=i1` by `j0..=j1` of a patch's grid.
     pub fn dice(
@@ -202,9 +209,8 @@ impl Dicer {
         out: &mut LatticeGrid,
     ) {
         let lane = self.load(surface, patch);
-        let (n_u, n_v) = (f64::from(rates.n_u), f64::from(rates.n_v));
-        let us = (i0..=i1).map(|i| f64::from(i) / n_u);
-        let vs = (j0..=j1).map(|j| f64::from(j) / n_v);
+        let us = parameters([i0, i1], rates.n_u);
+        let vs = parameters([j0, j1], rates.n_v);
         surface.grid(&mut self.points[lane], &mut self.evaluator, us, vs, &mut self.out);
         out.round(&self.out, ROUNDING);
         for side in [0, 2, 3, 1] {

@@ -4,7 +4,7 @@ use super::bounds::HullWeights;
 use super::parts::Parts;
 use super::plan::{Child, Children, Limit, Limits, NodeId, Plan, PlanLibrary, Step};
 use super::products::{child_points, control_points, one_product, refined_points};
-use super::regular::{self, Basis, ControlPoints};
+use super::regular::{self, BasisCache, ControlPoints};
 use super::rows::SparseRows;
 use crate::math::PointGrid;
 use crate::math::simd;
@@ -104,8 +104,8 @@ const MAX_DEPTH: u32 = 52;
 pub struct Evaluator {
     /// Ring points of all levels of the current walk, a stack.
     pub(super) points: Vec<Point>,
-    /// Basis function values of a regular part, for u then v.
-    basis: Vec<Basis>,
+    /// Basis function values of the last lists of parameters along u and along v.
+    basis: [BasisCache; 2],
     /// Parameters of all levels, a stack.
     params: Vec<f64>,
     pub(super) hulls: HullWeights,
@@ -374,7 +374,9 @@ impl Evaluator {
 
     fn regular(&mut self, control: &ControlPoints, target: Target, out: &mut PointGrid) {
         let (u, v) = (&self.params[target.us.0..target.us.1], &self.params[target.vs.0..target.vs.1]);
-        simd::run(regular::Positions { control, u, v, out, first: target.first, basis: &mut self.basis });
+        let [of_u, of_v] = &mut self.basis;
+        let (u, v) = (of_u.get(u), of_v.get(v));
+        simd::run(regular::Positions { control, u, v, out, first: target.first });
     }
 
     /// Position and tangents at one point.

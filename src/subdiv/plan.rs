@@ -281,7 +281,8 @@ impl PlanLibrary {
         let nothing = self.rows.push([]);
         let n_points = ring.n_vertices() as u32;
         let shape = self.rows.push_indices(&route(ring));
-        let node = Node { n_points, rows: nothing, shape, n_pole: 0, children: 0, n_children: NONE, limits: 0, in_hull: true };
+        let node =
+            Node { n_points, rows: nothing, shape, n_pole: 0, children: 0, n_children: NONE, limits: 0, in_hull: true };
         self.nodes.push(node);
         self.by_key.insert(key.to_vec(), id);
         let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
@@ -308,7 +309,8 @@ impl PlanLibrary {
             .into_iter()
             .map(|Quarter { node, turn, points }| {
                 let node = node.unwrap_or_else(|ring| self.node(&ring)).turned(turn);
-                self.plain_child(node, &points).unwrap_or_else(|| Child { node, points: self.rows.push_indices(&points) })
+                self.plain_child(node, &points)
+                    .unwrap_or_else(|| Child { node, points: self.rows.push_indices(&points) })
             })
             .collect();
         let n_limits = if n == 4 { 4 } else { 0 };
@@ -341,7 +343,16 @@ impl PlanLibrary {
     fn push_plain(&mut self) -> NodeId {
         let id = NodeId::unturned(self.nodes.len());
         let (rows, shape) = (self.rows.push([]), self.rows.push_indices(&[]));
-        self.nodes.push(Node { n_points: 16, rows, shape, n_pole: 0, children: 0, n_children: 0, limits: 0, in_hull: true });
+        self.nodes.push(Node {
+            n_points: 16,
+            rows,
+            shape,
+            n_pole: 0,
+            children: 0,
+            n_children: 0,
+            limits: 0,
+            in_hull: true,
+        });
         id
     }
 

@@ -45,13 +45,15 @@ pub(super) struct Pole<'a> {
 impl<'a> Pole<'a> {
     /// The pole that a ring is, if it is one.
     pub fn new(ring: &'a LocalMesh) -> Option<Self> {
-        let is_smooth = ring.all_quads() && ring.fins.is_empty() && ring.tags.iter().all(|t| *t == VertexTags::default());
+        let is_smooth =
+            ring.all_quads() && ring.fins.is_empty() && ring.tags.iter().all(|t| *t == VertexTags::default());
         if !is_smooth || ring.n_corners() != 4 {
             return None;
         }
         let sizes = [0, 1, 2, 3].map(|k| ring.fan_size(k));
         let apex = (0..4u32).find(|&k| sizes[k as usize].0 != 4)?;
-        let is_pole = (0..4).all(|k| sizes[k].1 && (k == apex as usize) == (sizes[k].0 != 4)) && sizes[apex as usize].0 > 2;
+        let is_pole =
+            (0..4).all(|k| sizes[k].1 && (k == apex as usize) == (sizes[k].0 != 4)) && sizes[apex as usize].0 > 2;
         is_pole.then(|| Self::at(ring, apex))
     }
 
@@ -60,13 +62,7 @@ impl<'a> Pole<'a> {
         let sides = [0, 1, 2, 3].map(|k| next(apex, k));
         let right = ring.next(ring.twin(sides[1]));
         let above = ring.twin(sides[2]);
-        let beyond = [
-            ring.next(ring.twin(right)),
-            right,
-            ring.twin(next(right, 2)),
-            above,
-            ring.twin(next(above, 3)),
-        ];
+        let beyond = [ring.next(ring.twin(right)), right, ring.twin(next(right, 2)), above, ring.twin(next(above, 3))];
         Self { ring, spokes: ring.fan(apex).spokes, sides, beyond }
     }
 
@@ -82,7 +78,8 @@ impl<'a> Pole<'a> {
 
     /// The refined vertices, in the order of [`PoleStep`]; `None` if some of them are the same.
     pub fn refined(&self, view: &RefinedView<'_>) -> Option<Vec<u32>> {
-        let (vertex, edge, face) = (|h: u32| view.vertex(4 * h), |h: u32| view.vertex(4 * h + 1), |h: u32| view.vertex(4 * h + 2));
+        let (vertex, edge, face) =
+            (|h: u32| view.vertex(4 * h), |h: u32| view.vertex(4 * h + 1), |h: u32| view.vertex(4 * h + 2));
         let before = |h: u32| self.ring.prev(h);
         let [_, side, top, last] = self.sides;
         let [below, right, corner, above, left] = self.beyond;

@@ -4,7 +4,7 @@ use super::eval::Point;
 use super::plan::{Child, Step, TURNED_CONTROL};
 use super::pole::PoleStep;
 use super::regular::ControlPoints;
-use super::rows::{Index, RowStore, RowsView, SparseRows, Span, Width, with_rows};
+use super::rows::{Index, RowStore, RowsView, Span, SparseRows, Width, with_rows};
 use crate::math::simd::{self, Kernel, Task};
 
 /// A row times points. Two sums, of the even and of the odd terms, keep the adder busy.

@@ -3,7 +3,7 @@
 use super::eval::Point;
 use crate::math::PointGrid;
 use crate::math::point_grid::LANES;
-use crate::math::simd::{Kernel, Task};
+use crate::math::simd::{self, Kernel, Task};
 
 /// 16 control points, u fastest; the patch lies between `[5]`, `[6]`, `[9]` and `[10]`.
 pub type ControlPoints = [Point; 16];
@@ -82,17 +82,56 @@ fn basis_lanes<K: Kernel>(k: K, t: K::D) -> Basis {
     ]
 }
 
-/// Appends the basis at parameters, four by four, the last one repeated.
-#[inline(always)]
-fn push_basis<K: Kernel>(k: K, parameters: &[f64], out: &mut Vec<Basis>) {
-    let (fours, rest) = parameters.as_chunks::<LANES>();
-    for four in fours {
-        out.push(basis_lanes(k, k.load4(four)));
+/// The basis at parameters, four by four, the last one repeated.
+#[derive(Debug, Default)]
+pub(super) struct BasisList {
+    parameters: Vec<f64>,
+    basis: Vec<Basis>,
+}
+
+/// Fills a list.
+struct FillBasis<'a>(&'a mut BasisList);
+
+impl Task for FillBasis<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) {
+        let BasisList { parameters, basis } = self.0;
+        basis.clear();
+        for four in parameters.chunks(LANES) {
+            let mut all = [four[four.len() - 1]; LANES];
+            all[..four.len()].copy_from_slice(four);
+            basis.push(basis_lanes(k, k.load4(&all)));
+        }
     }
-    if let Some(&last) = rest.last() {
-        let mut four = [last; LANES];
-        four[..rest.len()].copy_from_slice(rest);
-        out.push(basis_lanes(k, k.load4(&four)));
+}
+
+/// Lists that are remembered: those of pieces at a few rates, and of the ever smaller parts at an irregular corner.
+const N_LISTS: usize = 32;
+
+/// The bases of the last lists of parameters: the pieces of a mesh have few different ones.
+#[derive(Debug)]
+pub(super) struct BasisCache([BasisList; N_LISTS]);
+
+impl Default for BasisCache {
+    fn default() -> Self {
+        Self(std::array::from_fn(|_| BasisList::default()))
+    }
+}
+
+impl BasisCache {
+    /// The basis at a list of parameters, which is not empty.
+    #[inline]
+    pub fn get(&mut self, parameters: &[f64]) -> &BasisList {
+        let (first, n) = (parameters[0], parameters.len());
+        let place = ((16.0 * first) as usize ^ (64.0 * parameters[n - 1]) as usize ^ (5 * n)) % N_LISTS;
+        let list = &mut self.0[place];
+        if list.parameters != parameters {
+            list.parameters.clear();
+            list.parameters.extend_from_slice(parameters);
+            simd::run(FillBasis(list));
+        }
+        list
     }
 }
 
@@ -113,34 +152,27 @@ fn by_axis<K: Kernel>(k: K, c: &ControlPoints) -> [[K::D; 4]; 3] {
 /// each row are overwritten.
 pub(super) struct Positions<'a> {
     pub control: &'a ControlPoints,
-    pub u: &'a [f64],
-    pub v: &'a [f64],
+    pub u: &'a BasisList,
+    pub v: &'a BasisList,
     pub out: &'a mut PointGrid,
     pub first: [usize; 2],
-    /// Memory to work in.
-    pub basis: &'a mut Vec<Basis>,
 }
 
 impl Task for Positions<'_> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) {
-        let Self { control, u, v, out, first: [i0, j0], basis } = self;
-        basis.clear();
-        push_basis(k, u, basis);
-        let n_u = basis.len();
-        push_basis(k, v, basis);
-        let (u, v_basis) = basis.split_at(n_u);
+        let Self { control, u, v, out, first: [i0, j0] } = self;
         let control = by_axis(k, control);
-        for j in 0..v.len() {
-            let four = &v_basis[j / LANES];
+        for j in 0..v.parameters.len() {
+            let four = &v.basis[j / LANES];
             let lane = j % LANES;
             let v = [four[0][lane], four[1][lane], four[2][lane], four[3][lane]];
             for (axis, rows) in control.iter().enumerate() {
                 let curve = k.store4(combine_lanes(k, &v, *rows));
                 let curve = [k.splat4(curve[0]), k.splat4(curve[1]), k.splat4(curve[2]), k.splat4(curve[3])];
-                let row = out.run_mut(axis, [i0, j0 + j], LANES * n_u);
-                for (out, u) in row.as_chunks_mut::<LANES>().0.iter_mut().zip(u) {
+                let row = out.run_mut(axis, [i0, j0 + j], LANES * u.basis.len());
+                for (out, u) in row.as_chunks_mut::<LANES>().0.iter_mut().zip(&u.basis) {
                     *out = k.store4(combine_curve(k, u, curve));
                 }
             }
@@ -437,7 +469,10 @@ mod tests {
                 };
                 let expected = run(Hull { control: &c, u: &part(u, a), v: &part(v, b) });
                 let hull = out[MOST_PARTS * b + a];
-                assert!((0..2).all(|k| (hull[k] - expected[k]).max_abs() < 1e-14), "{side} {a} {b}: {hull:?} {expected:?}");
+                assert!(
+                    (0..2).all(|k| (hull[k] - expected[k]).max_abs() < 1e-14),
+                    "{side} {a} {b}: {hull:?} {expected:?}"
+                );
             }
         }
     }
@@ -449,7 +484,8 @@ mod tests {
         let mut out = PointGrid::default();
         out.reset(11, 4);
         let (u, v) = (&t[..], &t[2..5]);
-        run(Positions { control: &c, u, v, out: &mut out, first: [2, 1], basis: &mut Vec::new() });
+        let [mut of_u, mut of_v] = [BasisCache::default(), BasisCache::default()];
+        run(Positions { control: &c, u: of_u.get(u), v: of_v.get(v), out: &mut out, first: [2, 1] });
         for (j, &v) in v.iter().enumerate() {
             for (i, &u) in u.iter().enumerate() {
                 assert_eq!(out.point(2 + i, 1 + j), at(&c, u, v).0[..3]);

@@ -178,12 +178,28 @@ impl Kernel for Avx2 {
         in_registers!(_mm256_sub_epi32(a, b))
     }
     #[inline(always)]
-    fn even_lanes(self, x: __m256i) -> [i32; 4] {
-        let mut out = [0; 4];
-        // SAFETY: `self` proves AVX2; `out` is 16 writable bytes and the store needs no alignment.
+    fn store_i(self, x: __m256i) -> [i32; 8] {
+        let mut out = [0; 8];
+        // SAFETY: `self` proves AVX2; `out` is 32 writable bytes and the store needs no alignment.
+        unsafe { _mm256_storeu_si256(out.as_mut_ptr().cast(), x) };
+        out
+    }
+    #[inline(always)]
+    fn even_lanes(self, a: __m256i, b: __m256i) -> __m256i {
+        in_registers!({
+            let in_halves = _mm256_shuffle_ps::<0b10_00_10_00>(_mm256_castsi256_ps(a), _mm256_castsi256_ps(b));
+            _mm256_permute4x64_epi64::<0b11_01_10_00>(_mm256_castps_si256(in_halves))
+        })
+    }
+    #[inline(always)]
+    fn lower_threes(self, x: __m256i) -> [[u8; 16]; 2] {
+        let mut out = [[0; 16]; 2];
+        // SAFETY: `self` proves AVX2; each half of `out` is 16 writable bytes and the stores need no alignment.
         unsafe {
-            let first = _mm256_permutevar8x32_epi32(x, _mm256_setr_epi32(0, 2, 4, 6, 1, 3, 5, 7));
-            _mm_storeu_si128(out.as_mut_ptr().cast(), _mm256_castsi256_si128(first));
+            let places = _mm_setr_epi8(0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, -1, -1, -1, -1);
+            let packed = _mm256_shuffle_epi8(x, _mm256_broadcastsi128_si256(places));
+            _mm_storeu_si128(out[0].as_mut_ptr().cast(), _mm256_castsi256_si128(packed));
+            _mm_storeu_si128(out[1].as_mut_ptr().cast(), _mm256_extracti128_si256::<1>(packed));
         }
         out
     }

@@ -96,8 +96,12 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn max_i(self, a: Self::I, b: Self::I) -> Self::I;
     /// Lanewise difference, wrapping.
     fn sub_i(self, a: Self::I, b: Self::I) -> Self::I;
-    /// Lanes 0, 2, 4 and 6.
-    fn even_lanes(self, x: Self::I) -> [i32; 4];
+    /// The lanes as an array.
+    fn store_i(self, x: Self::I) -> [i32; 8];
+    /// Lanes 0, 2, 4 and 6 of both.
+    fn even_lanes(self, a: Self::I, b: Self::I) -> Self::I;
+    /// The lower three bytes of each lane in little-endian order, those of four lanes together and four zeros after them.
+    fn lower_threes(self, x: Self::I) -> [[u8; 16]; 2];
     /// The lower halves of the lanes.
     fn lower_halves(self, x: Self::I) -> [u16; 8];
 

@@ -154,8 +154,17 @@ impl Kernel for Portable {
         from_fn(|k| a[k].wrapping_sub(b[k]))
     }
     #[inline(always)]
-    fn even_lanes(self, x: [i32; 8]) -> [i32; 4] {
-        [x[0], x[2], x[4], x[6]]
+    fn store_i(self, x: [i32; 8]) -> [i32; 8] {
+        x
+    }
+    #[inline(always)]
+    fn even_lanes(self, a: [i32; 8], b: [i32; 8]) -> [i32; 8] {
+        [a[0], a[2], a[4], a[6], b[0], b[2], b[4], b[6]]
+    }
+    #[inline(always)]
+    fn lower_threes(self, x: [i32; 8]) -> [[u8; 16]; 2] {
+        let byte = |lane: usize, i: usize| x[lane].to_le_bytes()[i];
+        from_fn(|half| from_fn(|i| if i < 12 { byte(4 * half + i / 3, i % 3) } else { 0 }))
     }
     #[inline(always)]
     fn lower_halves(self, x: [i32; 8]) -> [u16; 8] {

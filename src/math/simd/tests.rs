@@ -101,8 +101,9 @@ impl Task for RoundOfIntegers {
         let results = [k.min_i(a, b), k.max_i(a, b), k.sub_i(a, b), k.splat_i(self.0 as i32)];
         let mut out = Vec::new();
         for x in results {
-            out.extend(k.even_lanes(x));
+            out.extend(k.store_i(k.even_lanes(x, a)));
             out.extend(k.lower_halves(x).map(i32::from));
+            out.extend(k.lower_threes(x).into_iter().flatten().map(i32::from));
         }
         out
     }
