@@ -14,6 +14,8 @@ const MOST_PATCHES: usize = 1 << 13;
 pub struct BuildCosts {
     by_patch: FxHashMap<(MeshId, PatchId), u64>,
     by_mesh: FxHashMap<MeshId, u64>,
+    /// The last patch and its blocks that are not counted above yet: a node and its pieces are mostly built in a row.
+    last: Option<PatchCost>,
 }
 
 /// A patch and the blocks that were built for it.
@@ -30,6 +32,18 @@ pub struct PatchCost {
 impl BuildCosts {
     /// Counts blocks built for a patch.
     pub fn add(&mut self, mesh: MeshId, patch: PatchId, blocks: u64) {
+        match &mut self.last {
+            Some(last) if (last.mesh, last.patch) == (mesh, patch) => last.blocks += blocks,
+            _ => {
+                self.count_last();
+                self.last = Some(PatchCost { mesh, patch, blocks });
+            }
+        }
+    }
+
+    /// Counts what was only noted.
+    fn count_last(&mut self) {
+        let Some(PatchCost { mesh, patch, blocks }) = self.last.take() else { return };
         *self.by_mesh.entry(mesh).or_default() += blocks;
         *self.by_patch.entry((mesh, patch)).or_default() += blocks;
         if self.by_patch.len() > MOST_PATCHES {
@@ -37,8 +51,16 @@ impl BuildCosts {
         }
     }
 
+    fn all_counted(&self) -> Self {
+        let mut all = self.clone();
+        all.count_last();
+        all
+    }
+
     /// Adds what another thread has counted.
-    pub fn merge(&mut self, other: Self) {
+    pub fn merge(&mut self, mut other: Self) {
+        self.count_last();
+        other.count_last();
         for ((mesh, patch), blocks) in other.by_patch {
             *self.by_patch.entry((mesh, patch)).or_default() += blocks;
         }
@@ -53,7 +75,7 @@ impl BuildCosts {
     /// The `n` patches with most blocks, most first.
     pub fn costliest_patches(&self, n: usize) -> Vec<PatchCost> {
         let cost = |(&(mesh, patch), &blocks): (&(MeshId, PatchId), &u64)| PatchCost { mesh, patch, blocks };
-        let mut all: Vec<PatchCost> = self.by_patch.iter().map(cost).collect();
+        let mut all: Vec<PatchCost> = self.all_counted().by_patch.iter().map(cost).collect();
         all.sort_by_key(|c| (std::cmp::Reverse(c.blocks), c.mesh, c.patch));
         all.truncate(n);
         all
@@ -61,7 +83,7 @@ impl BuildCosts {
 
     /// The `n` meshes with most blocks, most first.
     pub fn costliest_meshes(&self, n: usize) -> Vec<(MeshId, u64)> {
-        let mut all: Vec<(MeshId, u64)> = self.by_mesh.iter().map(|(&mesh, &blocks)| (mesh, blocks)).collect();
+        let mut all: Vec<(MeshId, u64)> = self.all_counted().by_mesh.into_iter().collect();
         all.sort_by_key(|&(mesh, blocks)| (std::cmp::Reverse(blocks), mesh));
         all.truncate(n);
         all
