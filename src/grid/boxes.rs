@@ -110,9 +110,9 @@ impl Head {
         grid: [u16; 2],
         format: u8,
     ) {
-        for k in 0..3 {
-            let base = whole[0][k];
-            let exponent = step_exponent((whole[1][k] - base) as u32);
+        let [lowest, highest] = whole;
+        for (k, (base, end)) in lowest.into_iter().zip(highest).enumerate() {
+            let exponent = step_exponent((end - base) as u32);
             let up = (1u32 << exponent) - 1;
             // Lanes that are not used may wrap around: they are masked after every test.
             self.planes[k] = boxes.low[k].map(|low| ((low.wrapping_sub(base) as u32) >> exponent) as u8);

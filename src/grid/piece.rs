@@ -123,8 +123,8 @@ impl Task for BlockBoxes<'_> {
     fn run<K: Kernel>(self, k: K) -> IntegerBox {
         let [n_a, n_b] = self.lanes.map(usize::from);
         let last_row = self.vertices.size()[1] - 1;
-        let mut whole = [[0; 3]; 2];
-        for axis in 0..3 {
+        let [mut lowest, mut highest] = [[0; 3]; 2];
+        for (axis, (lowest, highest)) in lowest.iter_mut().zip(&mut highest).enumerate() {
             let row = |j: usize| self.vertices.window(axis, j.min(last_row));
             let mut below = min_max_of_threes(k, row(0));
             let mut of_all = [k.splat_i(i32::MAX), k.splat_i(i32::MIN)];
@@ -142,13 +142,13 @@ impl Task for BlockBoxes<'_> {
             }
             // Lanes beyond the last block of a row hold what they may.
             let (low, high) = (k.store_i(of_all[0]), k.store_i(of_all[1]));
-            (whole[0][axis], whole[1][axis]) = (low[0], high[0]);
+            (*lowest, *highest) = (low[0], high[0]);
             for lane in 0..n_a {
-                whole[0][axis] = whole[0][axis].min(low[lane].min(low[4 + lane]));
-                whole[1][axis] = whole[1][axis].max(high[lane].max(high[4 + lane]));
+                *lowest = (*lowest).min(low[lane].min(low[4 + lane]));
+                *highest = (*highest).max(high[lane].max(high[4 + lane]));
             }
         }
-        whole
+        [lowest, highest]
     }
 }
 

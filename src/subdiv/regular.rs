@@ -260,13 +260,16 @@ fn bezier_points<K: Kernel>(k: K, c: [K::D; 4]) -> [K::D; 4] {
 /// The lowest and the highest of 36 times the Bézier points of a patch.
 #[inline(always)]
 pub(super) fn whole_hull<K: Kernel>(k: K, c: &[K::D; 16]) -> (K::D, K::D) {
-    let mut columns = [[k.splat4(0.0); 4]; 4];
-    for (i, column) in columns.iter_mut().enumerate() {
-        *column = bezier_points(k, [c[i], c[4 + i], c[8 + i], c[12 + i]]);
+    let mut rows = [[k.splat4(0.0); 4]; 4];
+    for i in 0..4 {
+        let column = bezier_points(k, [c[i], c[4 + i], c[8 + i], c[12 + i]]);
+        for (row, p) in rows.iter_mut().zip(column) {
+            row[i] = p;
+        }
     }
     let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
-    for j in 0..4 {
-        for p in bezier_points(k, [columns[0][j], columns[1][j], columns[2][j], columns[3][j]]) {
+    for row in rows {
+        for p in bezier_points(k, row) {
             (low, high) = (k.min4(low, p), k.max4(high, p));
         }
     }
