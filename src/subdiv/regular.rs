@@ -107,7 +107,7 @@ impl Task for FillBasis<'_> {
 }
 
 /// Lists that are remembered: those of pieces at a few rates, and of the ever smaller parts at an irregular corner.
-const N_LISTS: usize = 32;
+const N_LISTS: usize = 64;
 
 /// The bases of the last lists of parameters: the pieces of a mesh have few different ones.
 #[derive(Debug)]
@@ -123,8 +123,10 @@ impl BasisCache {
     /// The basis at a list of parameters, which is not empty.
     #[inline]
     pub fn get(&mut self, parameters: &[f64]) -> &BasisList {
-        let (first, n) = (parameters[0], parameters.len());
-        let place = ((16.0 * first) as usize ^ (64.0 * parameters[n - 1]) as usize ^ (5 * n)) % N_LISTS;
+        let (n, last) = (parameters.len(), parameters[parameters.len() - 1]);
+        let key = parameters[0].to_bits().rotate_left(32) ^ last.to_bits() ^ n as u64;
+        // The upper bits of a product depend on all bits of the key (Knuth 1998, 6.4).
+        let place = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - N_LISTS.ilog2())) as usize;
         let list = &mut self.0[place];
         if list.parameters != parameters {
             list.parameters.clear();
