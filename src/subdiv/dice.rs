@@ -211,7 +211,8 @@ impl Dicer {
         let lane = self.load(surface, patch);
         let us = parameters([i0, i1], rates.n_u);
         let vs = parameters([j0, j1], rates.n_v);
-        surface.grid(&mut self.points[lane], &mut self.evaluator, us, vs, &mut self.out);
+        let cells = Some([rates.n_u, rates.n_v]);
+        surface.grid(&mut self.points[lane], &mut self.evaluator, cells, us, vs, &mut self.out);
         out.round(&self.out, ROUNDING);
         for side in [0, 2, 3, 1] {
             self.settle_side(surface, patch, rates, side, [[i0, i1], [j0, j1]], out);
@@ -289,7 +290,7 @@ impl Dicer {
 
     fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> [f64; 3] {
         let lane = self.load(surface, patch);
-        surface.grid(&mut self.points[lane], &mut self.evaluator, [u], [v], &mut self.single);
+        surface.grid(&mut self.points[lane], &mut self.evaluator, None, [u], [v], &mut self.single);
         self.single.point(0, 0)
     }
 
@@ -481,7 +482,7 @@ impl OwnerScratch {
 
     fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> [i32; 3] {
         surface.load(patch, &mut self.points);
-        surface.grid(&mut self.points, &mut self.evaluator, [u], [v], &mut self.single);
+        surface.grid(&mut self.points, &mut self.evaluator, None, [u], [v], &mut self.single);
         round_point(self.single.point(0, 0)).0
     }
 }

@@ -5,7 +5,8 @@ use super::parts::Parts;
 use super::plan::{Child, Children, Limit, Limits, NodeId, Plan, PlanLibrary, Step};
 use super::products::{child_points, control_points, one_product, refined_points};
 use super::regular::{self, BasisCache, ControlPoints};
-use super::rows::SparseRows;
+use super::rows::{SparseRows, Width};
+use super::stencils::{self, StencilGrid};
 use crate::math::PointGrid;
 use crate::math::simd;
 use glam::DVec3;
@@ -109,6 +110,8 @@ pub struct Evaluator {
     /// Parameters of all levels, a stack.
     params: Vec<f64>,
     pub(super) hulls: HullWeights,
+    /// How many splits below the patch its parts have the cells that stencils are for, if the grid has such parts.
+    stencil_depth: Option<u32>,
 }
 
 /// A rectangle of a tensor grid of parameters, and where its points go.
@@ -137,6 +140,12 @@ pub(super) fn quarter(k: usize) -> (f64, f64) {
 /// a time, may spoil what is to the right of them.
 pub(super) const LEFT_FIRST: [usize; 4] = [0, 1, 3, 2];
 
+/// How many halvings of a patch with so many cells lead to parts that stencils are for.
+fn stencil_depth([n_u, n_v]: [u32; 2]) -> Option<u32> {
+    let is_square = n_u == n_v && n_u.is_power_of_two() && n_u >= stencils::CELLS;
+    is_square.then(|| (n_u / stencils::CELLS).ilog2())
+}
+
 fn exact_corner(u: f64, v: f64) -> Option<usize> {
     match (u, v) {
         (0.0, 0.0) => Some(0),
@@ -149,16 +158,20 @@ fn exact_corner(u: f64, v: f64) -> Option<usize> {
 
 impl Evaluator {
     /// Positions at all pairs of `us` and `vs` (each ascending, in 0..=1) of an irregular patch; point (i, j) of `out` is at `(us[i], vs[j])`.
+    /// They may be any, or some of those of a grid with `cells` along u and v.
     pub(super) fn grid(
         &mut self,
         library: &PlanLibrary,
         parts: &mut Parts,
+        cells: Option<[u32; 2]>,
         us: impl IntoIterator<Item = f64>,
         vs: impl IntoIterator<Item = f64>,
         out: &mut PointGrid,
     ) {
         let target = self.start_grid(us, vs, out);
+        self.stencil_depth = cells.and_then(stencil_depth);
         self.walk_parts(library, parts, 0, 0, target, out);
+        self.stencil_depth = None;
     }
 
     /// As [`walk`](Self::walk) for a part of a patch, whose parts are kept.
@@ -175,6 +188,9 @@ impl Evaluator {
             return self.regular(control, target, out);
         }
         let node = parts.node(part);
+        if self.by_stencils(library, node, parts.points(part), depth, target, out) {
+            return;
+        }
         let quarters = if target.is_single() { None } else { parts.quarters(library, part) };
         let Some(first) = quarters else {
             let ring = self.start_ring(parts.points(part));
@@ -244,6 +260,9 @@ impl Evaluator {
             }
             Plan::Split { step, children, limits, .. } => (step, children, limits),
         };
+        if self.by_stencils(library, node, &self.points[ring..], depth, target, out) {
+            return;
+        }
         if target.is_single() || depth >= MAX_DEPTH {
             let (u, v) = (self.params[target.us.0], self.params[target.vs.0]);
             let corner = if depth >= MAX_DEPTH { exact_corner(u.round(), v.round()) } else { exact_corner(u, v) };
@@ -271,6 +290,41 @@ impl Evaluator {
         }
         self.points.truncate(start);
         self.set_corners(library, limits, &self.points[ring..], &target, out);
+    }
+
+    /// Finds a part's points by stencils, if it is a pole of the cells that they are for. Returns whether it is.
+    #[inline(always)]
+    fn by_stencils(
+        &self,
+        library: &PlanLibrary,
+        node: NodeId,
+        points: &[Point],
+        depth: u32,
+        target: Target,
+        out: &mut PointGrid,
+    ) -> bool {
+        if self.stencil_depth != Some(depth) {
+            return false;
+        }
+        let Plan::Split { step: Step { pole: Some(order), .. }, .. } = library.plan(node) else { return false };
+        let store = library.rows();
+        // The corners of a face come first among the points of its ring.
+        let apex = (store.index(order, 0) + node.turn() as usize) % 4;
+        let Some(weights) = stencils::weights(order.len(), apex) else { return false };
+        let number = |place: usize| (f64::from(stencils::CELLS) * self.params[place]) as usize;
+        let [i, j] = [target.us, target.vs].map(|(start, end)| [number(start), number(end - 1)]);
+        let first = target.first;
+        match store.widths() {
+            Width::Narrow(indices) => {
+                let ring = store.list(order, indices);
+                simd::run(StencilGrid { points, ring, weights, i, j, out, first });
+            }
+            Width::Wide(indices) => {
+                let ring = store.list(order, indices);
+                simd::run(StencilGrid { points, ring, weights, i, j, out, first });
+            }
+        }
+        true
     }
 
     /// Corners whose limit is known here, in place of what deeper parts made of them: a point alone comes no further than

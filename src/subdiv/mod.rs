@@ -38,6 +38,7 @@ pub mod regular;
 mod route;
 pub mod rows;
 pub mod rules;
+mod stencils;
 pub mod surface;
 
 pub use dice::{Dicer, PatchRates};

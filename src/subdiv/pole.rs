@@ -25,10 +25,10 @@ use crate::math::simd::{Kernel, Task};
 use crate::topology::{HalfEdges, VertexTags};
 
 /// Points of a ring beside the apex and its fan.
-const N_OUTER: usize = 7;
+pub(super) const N_OUTER: usize = 7;
 
 /// Refined points that the quarter at the apex does not have.
-const N_BEYOND: usize = 9;
+pub(super) const N_BEYOND: usize = 9;
 
 /// The half-edges of a pole from which all its points can be told.
 pub(super) struct Pole<'a> {
@@ -204,7 +204,7 @@ impl<I: Index> Task for PoleStep<'_, I> {
 pub(super) const MOST_POINTS: usize = 1 + 2 * 24 + N_OUTER;
 
 /// The numbers of points that are in a pole's order.
-const IN_ORDER: [u8; MOST_POINTS] = {
+pub(super) const IN_ORDER: [u8; MOST_POINTS] = {
     let mut order = [0; MOST_POINTS];
     let mut i = 0;
     while i < MOST_POINTS {
@@ -225,7 +225,7 @@ pub(super) struct PoleHull<'a, I> {
 
 /// The control points of the regular quarters among the refined points of a pole with `n` faces around its apex.
 #[inline(always)]
-fn regular_quarters(n: usize) -> [[usize; 16]; 3] {
+pub(super) fn regular_quarters(n: usize) -> [[usize; 16]; 3] {
     let (outer, beyond) = (1 + 2 * n, 1 + 2 * n + N_OUTER);
     let below = [2 * n - 1, 2 * n, outer, beyond];
     let row_0 = [5, 0, 1, outer + 1, beyond + 1];

@@ -320,6 +320,7 @@ impl Surface {
         &self,
         points: &mut PatchPoints,
         evaluator: &mut Evaluator,
+        cells: Option<[u32; 2]>,
         us: impl IntoIterator<Item = f64>,
         vs: impl IntoIterator<Item = f64>,
         out: &mut PointGrid,
@@ -329,7 +330,7 @@ impl Surface {
         } else if let Some(tree) = self.tree(points) {
             evaluator.edited_grid(&self.plans, tree, us, vs, out);
         } else {
-            evaluator.grid(&self.plans, &mut points.parts, us, vs, out);
+            evaluator.grid(&self.plans, &mut points.parts, cells, us, vs, out);
         }
     }
 

@@ -78,10 +78,10 @@ fn a_point_does_not_depend_on_its_company() {
         for patch in surface.visible_patches() {
             surface.load(patch, &mut points);
             let (mut together, mut alone) = (PointGrid::default(), PointGrid::default());
-            surface.grid(&mut points, &mut evaluator, parameters(), parameters(), &mut together);
+            surface.grid(&mut points, &mut evaluator, Some([8; 2]), parameters(), parameters(), &mut together);
             for k in 0..81 {
                 let (u, v) = (k % 9, k / 9);
-                surface.grid(&mut points, &mut evaluator, [u as f64 / 8.0], [v as f64 / 8.0], &mut alone);
+                surface.grid(&mut points, &mut evaluator, Some([8; 2]), [u as f64 / 8.0], [v as f64 / 8.0], &mut alone);
                 assert_eq!(alone.point(0, 0), together.point(u, v), "patch {patch}, ({u}, {v}) / 8");
             }
         }
