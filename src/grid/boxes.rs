@@ -40,7 +40,8 @@ pub(super) struct Head {
     pub format: u8,
     /// Things along u and v, 1 to 4 each.
     pub lanes: [u8; 2],
-    padding: [u8; 2],
+    /// The lanes that are used, as bits: `lane_mask(lanes)`.
+    mask: u16,
     pub cells: CellRect,
     /// Cells of the whole patch along u and v.
     pub grid: [u16; 2],
@@ -120,8 +121,8 @@ impl Head {
                 boxes.high[k].map(|high| ((high.wrapping_sub(base) as u32).wrapping_add(up) >> exponent) as u8);
             self.exponent[k] = exponent as u8;
         }
-        (self.base, self.format, self.lanes, self.padding) = (whole[0], format, lanes, [0; 2]);
-        (self.cells, self.grid) = (cells, grid);
+        (self.base, self.format, self.lanes) = (lowest, format, lanes);
+        (self.mask, self.cells, self.grid) = (lane_mask(lanes) as u16, cells, grid);
     }
 
     /// Makes the lane's box one that no ray meets: along the ray's longest axis it is left 255 planes before it is entered,
@@ -146,60 +147,99 @@ impl Head {
     #[inline(always)]
     pub fn test<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> LaneHits {
         let mut t_near = [0.0; 16];
-        let slabs = Slabs::new(self, ray);
-        let (low, low_t) = slabs.test(kernel, self, 0, t_max);
-        t_near[..8].copy_from_slice(&low_t);
+        let slabs = Slabs::new(kernel, self, ray);
+        let (low, low_t) = slabs.test(kernel, self.half_of_planes(0), t_max);
+        t_near[..8].copy_from_slice(&kernel.store(low_t));
         let mut mask = low;
-        // Lanes from 8 on are the third and fourth row.
-        if self.lanes[1] > 2 {
-            let (high, high_t) = slabs.test(kernel, self, 8, t_max);
-            t_near[8..].copy_from_slice(&high_t);
+        if self.has_high_lanes() {
+            let (high, high_t) = slabs.test(kernel, self.half_of_planes(1), t_max);
+            t_near[8..].copy_from_slice(&kernel.store(high_t));
             mask |= high << 8;
         }
-        LaneHits { mask: mask & lane_mask(self.lanes), t_near }
+        LaneHits { mask: mask & u32::from(self.mask), t_near }
+    }
+
+    /// [`Self::test`], without asking where the boxes are entered: bits of lanes.
+    #[inline(always)]
+    pub fn lanes_met<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> u32 {
+        let slabs = Slabs::new(kernel, self, ray);
+        let mut mask = slabs.test(kernel, self.half_of_planes(0), t_max).0;
+        if self.has_high_lanes() {
+            mask |= slabs.test(kernel, self.half_of_planes(1), t_max).0 << 8;
+        }
+        mask & u32::from(self.mask)
+    }
+
+    /// Whether there are lanes from 8 on: a third or fourth row.
+    #[inline(always)]
+    fn has_high_lanes(&self) -> bool {
+        self.mask > 0xff
+    }
+
+    /// The planes in units of four lanes, from lane 0 or 8 on: plane p of four lanes at index `p as usize`.
+    #[inline(always)]
+    fn half_of_planes(&self, half: usize) -> &[[u8; 4]; 22] {
+        let fours: &[[u8; 4]; 24] = bytemuck::cast_ref(&self.planes);
+        fours[2 * half..2 * half + 22].try_into().expect("two units of the last plane")
+    }
+
+    /// Base and, in the fourth place, exponents.
+    #[inline(always)]
+    fn frame(&self) -> &[i32; 4] {
+        bytemuck::from_bytes(&bytemuck::bytes_of(self)[..16])
     }
 }
 
-/// What a ray makes of a head: t of plane q of axis k is `q * step[k] + near[k]` (or `far`), see [`LatticeRay`].
-struct Slabs {
-    step: [f32; 3],
-    near: [f32; 3],
-    far: [f32; 3],
+/// What a ray makes of a head: t of plane q of axis k is `q * step[k] + near[k]` (or `far`), see [`LatticeRay`]. Each for
+/// x, y, z and one to spare, twice.
+struct Slabs<K: Kernel> {
+    step: K::F,
+    near: K::F,
+    far: K::F,
     near_planes: [Plane; 3],
     far_planes: [Plane; 3],
 }
 
-impl Slabs {
+/// Picks for [`Kernel::shuffle`]: x, y or z in every lane.
+const ALL_X: i32 = 0b00_00_00_00;
+const ALL_Y: i32 = 0b01_01_01_01;
+const ALL_Z: i32 = 0b10_10_10_10;
+
+impl<K: Kernel> Slabs<K> {
     #[inline(always)]
-    fn new(head: &Head, ray: &LatticeRay) -> Self {
-        let base = head.base.map(|b| b as f32);
+    fn new(k: K, head: &Head, ray: &LatticeRay) -> Self {
+        let frame = head.frame();
+        let base = k.floats_twice(frame);
+        let inv = k.load(&ray.inv);
         Self {
-            step: std::array::from_fn(|k| f32::from_bits((127 + u32::from(head.exponent[k])) << 23) * ray.inv[k]),
-            near: std::array::from_fn(|k| (base[k] - ray.near_origin[k]) * ray.inv[k]),
-            far: std::array::from_fn(|k| (base[k] - ray.far_origin[k]) * ray.inv[k]),
-            near_planes: ray.near_planes,
-            far_planes: ray.far_planes,
+            step: k.scaled_twice(inv, frame[3]),
+            near: k.mul(k.sub(base, k.load(&ray.near_origin)), inv),
+            far: k.mul(k.sub(base, k.load(&ray.far_origin)), inv),
+            near_planes: ray.sides.near,
+            far_planes: ray.sides.far,
         }
     }
 
-    /// The test of the eight lanes from `first` (0 or 8): their bits, and where the ray enters.
+    /// The test of eight lanes: their bits, and where the ray enters.
     #[inline(always)]
-    fn test<K: Kernel>(&self, kernel: K, head: &Head, first: usize, t_max: f32) -> (u32, [f32; 8]) {
-        let (mut enter, mut leave) = (kernel.splat(0.0), kernel.splat(t_max));
-        for k in 0..3 {
-            let step = kernel.splat(self.step[k]);
-            enter = kernel.max(plane_t(kernel, head, self.near_planes[k], first, step, self.near[k]), enter);
-            leave = kernel.min(plane_t(kernel, head, self.far_planes[k], first, step, self.far[k]), leave);
-        }
-        (kernel.le(enter, leave), kernel.store(enter))
+    fn test(&self, k: K, planes: &[[u8; 4]; 22], t_max: f32) -> (u32, K::F) {
+        let ([near_x, near_y, near_z], [far_x, far_y, far_z]) = (self.near_planes, self.far_planes);
+        let mut enter = k.max(self.plane_t::<ALL_X>(k, planes, near_x, self.near), k.splat(0.0));
+        enter = k.max(self.plane_t::<ALL_Y>(k, planes, near_y, self.near), enter);
+        enter = k.max(self.plane_t::<ALL_Z>(k, planes, near_z, self.near), enter);
+        let mut leave = k.min(self.plane_t::<ALL_X>(k, planes, far_x, self.far), k.splat(t_max));
+        leave = k.min(self.plane_t::<ALL_Y>(k, planes, far_y, self.far), leave);
+        leave = k.min(self.plane_t::<ALL_Z>(k, planes, far_z, self.far), leave);
+        (k.le(enter, leave), enter)
     }
-}
 
-/// t of one plane of the eight lanes from `first`.
-#[inline(always)]
-fn plane_t<K: Kernel>(k: K, head: &Head, plane: Plane, first: usize, step: K::F, offset: f32) -> K::F {
-    let q: &[u8; 8] = head.planes[plane as usize][first..first + 8].try_into().expect("eight lanes");
-    k.add(k.mul(k.widen(q), step), k.splat(offset))
+    /// t of one plane of eight lanes.
+    #[inline(always)]
+    fn plane_t<const AXIS: i32>(&self, k: K, planes: &[[u8; 4]; 22], plane: Plane, offset: K::F) -> K::F {
+        let two: &[[u8; 4]; 2] = planes[plane.index()..plane.index() + 2].try_into().expect("two units");
+        let q = k.widen(bytemuck::cast_ref(two));
+        k.add(k.mul(q, k.shuffle::<AXIS>(self.step)), k.shuffle::<AXIS>(offset))
+    }
 }
 
 /// The lanes of a block that a ray meets, and where it enters each.
@@ -227,13 +267,5 @@ impl LaneHits {
         }
         self.mask &= !(1 << nearest);
         (self.t_near[nearest] <= t_max).then_some(nearest)
-    }
-
-    /// Takes out any lane.
-    #[inline(always)]
-    pub fn pop(&mut self) -> Option<usize> {
-        let lane = (self.mask != 0).then_some(self.mask.trailing_zeros() as usize)?;
-        self.mask &= self.mask - 1;
-        Some(lane)
     }
 }

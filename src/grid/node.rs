@@ -102,4 +102,10 @@ impl<'b> NodeView<'b> {
     pub fn test<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> LaneHits {
         self.head.test(kernel, ray, t_max)
     }
+
+    /// The same, as bits, where the order does not matter.
+    #[inline(always)]
+    pub fn lanes_met<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> u32 {
+        self.head.lanes_met(kernel, ray, t_max)
+    }
 }

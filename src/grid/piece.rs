@@ -62,8 +62,14 @@ pub struct PieceLayout {
 /// Bytes of a piece with `lanes` blocks of 2x2 cells along u and v.
 #[inline(always)]
 fn block_bytes(lanes: [u8; 2], format: usize) -> usize {
+    used_bytes(lanes, format).next_multiple_of(LINE_BYTES)
+}
+
+/// The same, up to the last byte that may be loaded.
+#[inline(always)]
+fn used_bytes(lanes: [u8; 2], format: usize) -> usize {
     let [columns, rows] = lanes.map(|n| 2 * usize::from(n) + 1);
-    (HEAD_BYTES + 3 * columns * rows * format + TAIL_BYTES).next_multiple_of(LINE_BYTES)
+    HEAD_BYTES + 3 * columns * rows * format + TAIL_BYTES
 }
 
 impl PieceLayout {
@@ -288,7 +294,7 @@ impl<'b> PieceView<'b> {
     pub fn new(bytes: &'b [u8]) -> Self {
         let head: &Head = bytemuck::from_bytes(&bytes[..HEAD_BYTES]);
         let format = usize::from(head.format);
-        assert!((2..=4).contains(&format) && block_bytes(head.lanes, format) <= bytes.len(), "a whole piece");
+        assert!((2..=4).contains(&format) && used_bytes(head.lanes, format) <= bytes.len(), "a whole piece");
         Self { head, bytes }
     }
 
@@ -328,7 +334,12 @@ impl<'b> PieceView<'b> {
     /// Where the coordinates `axis` of row `j` begin.
     #[inline(always)]
     pub(super) fn row_start(&self, j: usize, axis: usize) -> usize {
-        let columns = 2 * usize::from(self.head.lanes[0]) + 1;
-        HEAD_BYTES + usize::from(self.head.format) * columns * (3 * j + axis)
+        HEAD_BYTES + usize::from(self.head.format) * self.columns() * (3 * j + axis)
+    }
+
+    /// Vertices of a row.
+    #[inline(always)]
+    pub(super) fn columns(&self) -> usize {
+        2 * usize::from(self.head.lanes[0]) + 1
     }
 }

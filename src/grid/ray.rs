@@ -1,6 +1,7 @@
 //! A ray made ready for boxes and triangles of the lattice.
 
 use super::TriangleId;
+use crate::math::simd::{Kernel, Portable};
 use glam::DVec3;
 
 /// Greatest magnitude of a lattice coordinate of a grid vertex.
@@ -18,43 +19,100 @@ const DUST: f64 = 5.421_010_862_427_522e-20;
 /// Direction components between this and its reciprocal, 2^400, are made ready without looking at special cases.
 const GREATEST_ORDINARY: f64 = f64::from_bits((1023 + 400) << 52);
 
-/// A plane of a box, as an index: low x, y, z, then high x, y, z. (A type of its own, so that indexing six planes needs no check.)
+/// A plane of a box: low x, y, z, then high x, y, z. (A type of its own, so that indexing six planes needs no check.)
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-#[repr(usize)]
+#[repr(u8)]
 pub enum Plane {
     /// Least x.
-    LowX,
+    LowX = 0,
     /// Least y.
-    LowY,
+    LowY = 4,
     /// Least z.
-    LowZ,
+    LowZ = 8,
     /// Greatest x.
-    HighX,
+    HighX = 12,
     /// Greatest y.
-    HighY,
+    HighY = 16,
     /// Greatest z.
-    HighZ,
+    HighZ = 20,
 }
 
 impl Plane {
-    /// Planes where a ray enters, by the signs of its direction: bit k is set where it is negative along axis k.
-    const NEAR: [[Self; 3]; 8] = Self::sides_by_signs([Self::LowX, Self::LowY, Self::LowZ], Self::HIGH);
-    /// Planes where it leaves.
-    const FAR: [[Self; 3]; 8] = Self::sides_by_signs(Self::HIGH, [Self::LowX, Self::LowY, Self::LowZ]);
+    const LOW: [Self; 3] = [Self::LowX, Self::LowY, Self::LowZ];
     const HIGH: [Self; 3] = [Self::HighX, Self::HighY, Self::HighZ];
 
-    const fn sides_by_signs(positive: [Self; 3], negative: [Self; 3]) -> [[Self; 3]; 8] {
-        let mut table = [positive; 8];
+    /// Where the plane starts in a list of six planes of four units each: so much the processor multiplies by itself.
+    #[inline(always)]
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// An axis of lattice space.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[repr(u8)]
+pub(crate) enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+/// What follows from the signs of a direction's components and from their order by magnitude. (Aligned, so that it is copied at once.)
+#[derive(Clone, Copy, Debug)]
+#[repr(align(16))]
+pub(crate) struct Sides {
+    /// The planes of a box where the ray enters, for x, y and z: low ones where the direction is positive.
+    pub near: [Plane; 3],
+    /// The planes where it leaves.
+    pub far: [Plane; 3],
+    /// Axes (x, y, z of the sheared space): z is that of the largest component; x and y are swapped if that is negative, which keeps the winding.
+    pub axes: [Axis; 3],
+}
+
+impl Sides {
+    /// By signs, times eight, and order. Bit k of the signs is set where the direction is negative along axis k; bits of
+    /// the order by magnitude are x >= y, x >= z and y >= z.
+    const TABLE: [Self; 64] = {
+        let mut table = [Self::of(0, 0); 64];
         let mut i = 0;
-        while i < 24 {
-            if (i / 3) >> (i % 3) & 1 == 1 {
-                table[i / 3][i % 3] = negative[i % 3];
-            }
+        while i < 64 {
+            table[i] = Self::of(i / 8, i % 8);
             i += 1;
         }
         table
+    };
+
+    const fn of(signs: usize, order: usize) -> Self {
+        const LARGEST: [usize; 8] = [2, 2, 2, 0, 1, 1, 1, 0];
+        let [mut near, mut far] = [Plane::LOW, Plane::HIGH];
+        let mut k = 0;
+        while k < 3 {
+            if signs >> k & 1 == 1 {
+                (near[k], far[k]) = (Plane::HIGH[k], Plane::LOW[k]);
+            }
+            k += 1;
+        }
+        let (axis, all) = (LARGEST[order], [Axis::X, Axis::Y, Axis::Z]);
+        let (x, y) = (all[(axis + 1) % 3], all[(axis + 2) % 3]);
+        let axes = if signs >> axis & 1 == 1 { [y, x, all[axis]] } else { [x, y, all[axis]] };
+        Self { near, far, axes }
+    }
+
+    /// Of a direction: x, y, z and one to spare, twice.
+    #[inline(always)]
+    fn of_direction<K: Kernel>(k: K, direction: K::F) -> Self {
+        /// For [`Kernel::shuffle`].
+        const XXY: i32 = 0b11_01_00_00;
+        const YZZ: i32 = 0b11_10_10_01;
+        let magnitude = k.abs(direction);
+        let order = k.le(k.shuffle::<YZZ>(magnitude), k.shuffle::<XXY>(magnitude)) as usize % 8;
+        let signs = k.negative(direction) as usize % 8;
+        Self::TABLE[order | signs << 3]
     }
 }
+
+/// x, y, z and anything, twice: so that what comes from boxes in the same order meets it in one operation.
+pub(crate) type Twice = [f32; 8];
 
 /// A ray in lattice space.
 ///
@@ -85,22 +143,17 @@ impl Plane {
 /// any t; where it is outside, the entry is beyond any t likewise. No operation on finite boxes gives infinity or NaN.
 #[derive(Clone, Copy, Debug)]
 pub struct LatticeRay {
-    /// The lattice point nearest to the origin; |coordinate| <= 2^25.
-    pub(crate) cell: [i32; 3],
-    /// The origin relative to `cell`, within half a step: so rays that start on the surface start where they should.
-    pub(crate) fraction: [f32; 3],
     /// Origin moved along the direction's sign by the slack: near planes are measured from it.
-    pub(crate) near_origin: [f32; 3],
+    pub(crate) near_origin: Twice,
     /// Origin moved against the direction's sign: far planes are measured from it.
-    pub(crate) far_origin: [f32; 3],
+    pub(crate) far_origin: Twice,
     /// 1 / direction, finite.
-    pub(crate) inv: [f32; 3],
-    /// The planes of a box where the ray enters, for x, y and z: low ones where the direction is positive.
-    pub(crate) near_planes: [Plane; 3],
-    /// The planes where it leaves.
-    pub(crate) far_planes: [Plane; 3],
-    /// Axes (x, y, z of the sheared space): z is that of the largest component; x and y are swapped if that is negative, which keeps the winding.
-    pub(crate) axes: [usize; 3],
+    pub(crate) inv: Twice,
+    /// The origin relative to `cell`, within half a step: so rays that start on the surface start where they should.
+    pub(crate) fraction: Twice,
+    /// The lattice point nearest to the origin, and one number to spare; |coordinate| <= 2^25.
+    pub(crate) cell: [i32; 4],
+    pub(crate) sides: Sides,
     /// Woop's shear: d_x/d_z, d_y/d_z, 1/d_z.
     pub(crate) shear: [f32; 3],
     /// Hits beyond are ignored. Negative for a ray that hits nothing.
@@ -116,47 +169,55 @@ impl LatticeRay {
     /// ([`TriangleId::NONE`]: every triangle can be).
     ///
     /// The direction may have any length. If it is zero, or anything is not finite (but for `t_max`), the ray hits nothing.
-    #[inline(always)]
     pub fn new(origin: DVec3, direction: DVec3, t_max: f32, skip: TriangleId) -> Self {
-        let magnitude = direction.abs();
-        let largest = magnitude.max_element();
-        let is_ordinary = magnitude.cmpge(DVec3::splat((largest * (2.0 * DUST)).max(1.0 / GREATEST_ORDINARY))).all()
-            && largest <= GREATEST_ORDINARY
-            && origin.abs().cmple(DVec3::splat(START_LIMIT)).all()
+        let four = |v: DVec3| [v.x, v.y, v.z, 0.0];
+        Self::of_lanes(Portable, four(origin), four(direction), t_max, skip)
+    }
+
+    /// [`Self::new`] of vectors in lanes 0 to 2; what is in the fourth does not matter.
+    #[inline(always)]
+    pub fn of_lanes<K: Kernel>(k: K, origin: K::D, direction: K::D, t_max: f32, skip: TriangleId) -> Self {
+        let magnitude = k.abs4(direction);
+        let largest = k.greatest_of_three(magnitude);
+        let least = (largest * (2.0 * DUST)).max(1.0 / GREATEST_ORDINARY);
+        let is_ordinary = k.lt4(k.splat4(least), magnitude)
+            & k.lt4(k.abs4(origin), k.splat4(START_LIMIT))
+            & k.lt4(k.splat4(largest), k.splat4(GREATEST_ORDINARY))
+            & 7
+            == 7
             && t_max >= 0.0;
         // The start is chosen, not the ray: so the ray is written where it stays, once.
         let start = if is_ordinary {
             let unit = power_of_two_below(largest);
             let t_unit = reciprocal_of_power(unit);
-            let direction = (direction * t_unit).as_vec3().to_array();
-            let inv = [1.0 / direction[0], 1.0 / direction[1], 1.0 / direction[2]];
+            let direction = k.floats_of(k.mul4(direction, k.splat4(t_unit)));
+            let inv = k.div(k.splat(1.0), direction);
             Start { origin, direction, inv, t_max: (f64::from(t_max) * unit) as f32, t_start: 0.0, t_unit }
         } else {
-            Start::at_the_extremes(origin, direction, t_max)
+            Start::of_numbers(k, Start::at_the_extremes(k.store4(origin), k.store4(direction), t_max))
         };
-        Self::from_start(start, skip)
+        Self::from_start(k, start, skip)
     }
 
     #[inline(always)]
-    fn from_start(start: Start, skip: TriangleId) -> Self {
+    fn from_start<K: Kernel>(k: K, start: Start<K::D, K::F>, skip: TriangleId) -> Self {
         let Start { origin: start, direction, inv, t_max, t_start, t_unit } = start;
-        let [(cell_x, x), (cell_y, y), (cell_z, z)] = [split(start.x), split(start.y), split(start.z)];
-        let origin = start.as_vec3();
-        let slack = (origin.abs().max_element() + LATTICE_LIMIT) * SLACK;
-        let forward = [slack.copysign(direction[0]), slack.copysign(direction[1]), slack.copysign(direction[2])];
-        let signs = is_negative(direction[0]) | is_negative(direction[1]) << 1 | is_negative(direction[2]) << 2;
-        let axes = shear_axes(direction, signs);
-        let [dx, dy, dz] = [direction[axes[0]], direction[axes[1]], direction[axes[2]]];
+        let whole = nearest_whole(k, start);
+        let slack = (k.greatest_of_three(k.abs4(start)) as f32 + LATTICE_LIMIT) * SLACK;
+        let forward = k.with_sign(k.splat(slack), direction);
+        let origin = k.floats_of(start);
+        let sides = Sides::of_direction(k, direction);
+        let [d, inverses] = [k.store(direction), k.store(inv)];
+        let of = |lanes: &[f32; 8], axis: usize| lanes[axis % 8];
+        let [x, y, z] = sides.axes.map(|axis| axis as usize);
         Self {
-            cell: [cell_x, cell_y, cell_z],
-            fraction: [x, y, z],
-            near_origin: [origin.x + forward[0], origin.y + forward[1], origin.z + forward[2]],
-            far_origin: [origin.x - forward[0], origin.y - forward[1], origin.z - forward[2]],
-            inv,
-            near_planes: Plane::NEAR[signs],
-            far_planes: Plane::FAR[signs],
-            axes,
-            shear: [dx / dz, dy / dz, 1.0 / dz],
+            near_origin: k.store(k.add(origin, forward)),
+            far_origin: k.store(k.sub(origin, forward)),
+            inv: inverses,
+            fraction: k.store(k.floats_of(k.sub4(start, whole))),
+            cell: k.nearest4(whole),
+            sides,
+            shear: [of(&d, x) / of(&d, z), of(&d, y) / of(&d, z), of(&inverses, z)],
             t_max,
             skip,
             t_start,
@@ -191,21 +252,22 @@ impl LatticeRay {
 }
 
 /// Where a ray starts and how it counts t.
-struct Start {
-    origin: DVec3,
+struct Start<D, F> {
+    origin: D,
     /// Scaled.
-    direction: [f32; 3],
-    inv: [f32; 3],
+    direction: F,
+    inv: F,
     t_max: f32,
     t_start: f64,
     t_unit: f64,
 }
 
-impl Start {
+impl Start<[f64; 4], [f32; 3]> {
     /// Whatever the numbers are.
     #[cold]
     #[inline(never)]
-    fn at_the_extremes(origin: DVec3, direction: DVec3, t_max: f32) -> Self {
+    fn at_the_extremes(origin: [f64; 4], direction: [f64; 4], t_max: f32) -> Self {
+        let [origin, direction] = [origin, direction].map(|v| DVec3::new(v[0], v[1], v[2]));
         let largest = direction.abs().max_element();
         let is_valid = largest > 0.0 && direction.is_finite() && origin.is_finite() && t_max >= 0.0;
         let (origin, direction, largest) =
@@ -216,7 +278,20 @@ impl Start {
         let t_max = t_start.map_or(-1.0, |t_start| (f64::from(t_max) / t_unit - t_start) as f32);
         let t_start = t_start.unwrap_or(0.0);
         let direction = [without_dust(scaled.x), without_dust(scaled.y), without_dust(scaled.z)];
-        Self { origin: origin + t_start * scaled, direction, inv: direction.map(inverse), t_max, t_start, t_unit }
+        let start = origin + t_start * scaled;
+        let origin = [start.x, start.y, start.z, 0.0];
+        Self { origin, direction, inv: direction.map(inverse), t_max, t_start, t_unit }
+    }
+}
+
+impl<D, F> Start<D, F> {
+    /// The same in lanes.
+    #[inline(always)]
+    fn of_numbers<K: Kernel<D = D, F = F>>(k: K, numbers: Start<[f64; 4], [f32; 3]>) -> Self {
+        let twice = |[x, y, z]: [f32; 3]| [x, y, z, 1.0, x, y, z, 1.0];
+        let Start { origin, direction, inv, t_max, t_start, t_unit } = numbers;
+        let [direction, inv] = [twice(direction), twice(inv)];
+        Self { origin: k.load4(&origin), direction: k.load(&direction), inv: k.load(&inv), t_max, t_start, t_unit }
     }
 }
 
@@ -233,18 +308,12 @@ fn reciprocal_of_power(p: f64) -> f64 {
     f64::from_bits(TWICE_THE_BIAS - p.to_bits())
 }
 
+/// The whole numbers nearest to coordinates, the even one of two at ties.
 #[inline(always)]
-fn is_negative(d: f32) -> usize {
-    (d.to_bits() >> 31) as usize
-}
-
-/// The whole number nearest to a coordinate (one of two at ties), and what is left, exact in f64 and rounded to f32.
-#[inline(always)]
-fn split(x: f64) -> (i32, f32) {
+fn nearest_whole<K: Kernel>(k: K, x: K::D) -> K::D {
     // In this range doubles are whole numbers, so that the sum is rounded to one.
     const TO_WHOLE: f64 = 6_755_399_441_055_744.0;
-    let whole = (x + TO_WHOLE) - TO_WHOLE;
-    (whole as i32, (x - whole) as f32)
+    k.sub4(k.add4(x, k.splat4(TO_WHOLE)), k.splat4(TO_WHOLE))
 }
 
 /// 1 / d, finite.
@@ -279,17 +348,4 @@ fn start_at_cube(origin: DVec3, direction: DVec3) -> Option<f64> {
         }
     }
     (enter <= leave).then_some(enter)
-}
-
-/// The axes x, y, z of the sheared space for a direction whose signs are as in [`Plane::NEAR`].
-#[inline(always)]
-fn shear_axes(direction: [f32; 3], signs: usize) -> [usize; 3] {
-    /// By the axis of the largest component, and whether that is negative.
-    const AXES: [[[usize; 3]; 2]; 3] = [[[1, 2, 0], [2, 1, 0]], [[2, 0, 1], [0, 2, 1]], [[0, 1, 2], [1, 0, 2]]];
-    /// The axis, by x >= y, x >= z and y >= z.
-    const LARGEST: [u8; 8] = [2, 2, 2, 0, 1, 1, 1, 0];
-    let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
-    let order = usize::from(x >= y) | usize::from(x >= z) << 1 | usize::from(y >= z) << 2;
-    let axis = usize::from(LARGEST[order]);
-    AXES[axis % 3][signs >> axis & 1]
 }

@@ -2,6 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::boxes::{HEAD_BYTES, LaneHits};
+use super::ray::Axis;
 use super::{LatticeHit, LatticeRay, PieceView, TriangleId};
 use crate::ids::PatchId;
 use crate::math::simd::Kernel;
@@ -51,8 +52,10 @@ impl PieceView<'_> {
     #[inline(always)]
     pub fn occluded<K: Kernel>(&self, kernel: K, ray: &LatticeRay, patch: PatchId) -> bool {
         self.prefetch(kernel);
-        let mut blocks = self.head.test(kernel, ray, ray.t_max);
-        while let Some(lane) = blocks.pop() {
+        let mut blocks = self.head.lanes_met(kernel, ray, ray.t_max);
+        while blocks != 0 {
+            let lane = blocks.trailing_zeros() as usize;
+            blocks &= blocks - 1;
             let found = self.test_block(kernel, ray, lane, ray.t_max);
             if found.is_some_and(|f| f.lanes().any(|t| self.triangle_id(patch, lane, t) != ray.skip)) {
                 return true;
@@ -149,13 +152,14 @@ struct Rows<K: Kernel> {
 // No closures over lanes here: code that is not `#[inline(always)]` is compiled without the kernel's instructions, twenty times slower.
 impl<K: Kernel> Rows<K> {
     #[inline(always)]
-    fn load<const BYTES: usize>(piece: &PieceView, k: K, ray: &LatticeRay, block: usize, axis: usize) -> Self {
-        let (column, row) = (2 * (block & 3), 2 * (block >> 2));
-        let at = piece.row_start(row, axis) + BYTES * column;
-        let next = piece.row_start(1, axis) - piece.row_start(0, axis);
+    fn load<const BYTES: usize>(piece: &PieceView, k: K, ray: &LatticeRay, block: usize, axis: Axis) -> Self {
+        let (column, row, axis) = (2 * (block & 3), 2 * (block >> 2), axis as usize);
+        let row_bytes = BYTES * piece.columns();
+        let next = 3 * row_bytes;
+        let at = HEAD_BYTES + next * row + row_bytes * axis + BYTES * column;
         // Relative to the ray's own lattice point: exact, whatever the distance from the lattice's centre.
         let (base, origin) = (piece.head.base[axis] - ray.cell[axis], k.splat(ray.fraction[axis]));
-        // SAFETY: `PieceView::new` checked that the bytes hold every vertex of the lanes in the head and the tail after them. `block` is one of
+        // SAFETY: `PieceView::new` checked that the bytes hold every vertex of the lanes in the head and the tail after them; `BYTES` is their format. `block` is one of
         // those lanes, so each place is at least three coordinates before the end of the vertices. The load reads four coordinates,
         // and for BYTES = 3 four bytes more: at most one coordinate and four bytes beyond the vertices, eight bytes, the tail's size.
         let (low, high) = unsafe {
@@ -189,7 +193,7 @@ impl<K: Kernel> Rows<K> {
 impl<K: Kernel> Eight<K> {
     #[inline(always)]
     fn load<const BYTES: usize>(piece: &PieceView, k: K, ray: &LatticeRay, block: usize) -> Self {
-        let [kx, ky, kz] = ray.axes;
+        let [kx, ky, kz] = ray.sides.axes;
         let z = Rows::load::<BYTES>(piece, k, ray, block, kz);
         let x = Rows::load::<BYTES>(piece, k, ray, block, kx).sheared(k, ray.shear[0], &z);
         let y = Rows::load::<BYTES>(piece, k, ray, block, ky).sheared(k, ray.shear[1], &z);

@@ -24,11 +24,11 @@ impl Entrance {
         }
     }
 
-    /// Origin and direction of the ray in lattice space, if it comes within reach: the lengths of t stay.
+    /// Origin and direction of the ray in lattice space, in lanes 0 to 2, if it comes within reach: the lengths of t stay.
     ///
     /// A ray within a plane of the box gives 0 * infinity on that axis; the comparisons pass over it.
     #[inline(always)]
-    pub fn ray_in_reach<K: Kernel>(&self, k: K, ray: &Ray) -> Option<[DVec3; 2]> {
+    pub fn ray_in_reach<K: Kernel>(&self, k: K, ray: &Ray) -> Option<[K::D; 2]> {
         let [x, y, z, translation] = &self.columns;
         let (x, y, z) = (k.load4(x), k.load4(y), k.load4(z));
         // Components one by one: whoever made the ray has just written them one by one, and a wider load would wait for that.
@@ -40,9 +40,8 @@ impl Entrance {
         let (low, high) = (k.store4(k.min4(a, b)), k.store4(k.max4(a, b)));
         let enter = later(low[2], later(low[1], later(low[0], 0.0)));
         let leave = sooner(high[2], sooner(high[1], sooner(high[0], f64::INFINITY)));
-        let [o, d] = [k.store4(origin), k.store4(direction)];
         let is_in_reach = enter <= leave * (1.0 + 1e-9);
-        is_in_reach.then_some([DVec3::new(o[0], o[1], o[2]), DVec3::new(d[0], d[1], d[2])])
+        is_in_reach.then_some([origin, direction])
     }
 }
 

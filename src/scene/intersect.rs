@@ -10,7 +10,7 @@
 use super::accel::TraversalStack;
 use super::batch::{BatchOrder, MOST_RAYS};
 use super::builder::{Builder, PatchContext};
-use super::patch_walk::{ClosestInPatch, OccludedInPatch};
+use super::patch_walk::{ClosestInPatch, InPatch, OccludedInPatch};
 use super::world::{GridCache, World, WorldMesh};
 use crate::cache::{Pin, SlotId, TraceLog};
 use crate::grid::{LatticeHit, LatticeRay, TriangleId};
@@ -65,12 +65,12 @@ struct Stacks {
 
 /// The ray as the mesh's lattice sees it. `t` keeps its meaning.
 #[inline(always)]
-fn lattice_ray([origin, direction]: [DVec3; 2], id: MeshId, ray: &Ray, t_max: f32) -> LatticeRay {
+fn lattice_ray<K: Kernel>(k: K, [origin, direction]: [K::D; 2], id: MeshId, ray: &Ray, t_max: f32) -> LatticeRay {
     let skip = match ray.from {
         Some(from) if from.mesh == id => triangle_id(&from),
         _ => TriangleId::NONE,
     };
-    LatticeRay::new(origin, direction, t_max, skip)
+    LatticeRay::of_lanes(k, origin, direction, t_max, skip)
 }
 
 struct ClosestInMesh<'a, 'w> {
@@ -89,7 +89,7 @@ impl Task for ClosestInMesh<'_, '_> {
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
         let entering = mesh.entrance().ray_in_reach(kernel, ray)?;
-        let ray = &lattice_ray(entering, id, ray, t_max);
+        let ray = &lattice_ray(kernel, entering, id, ray, t_max);
         let hit = &mut LatticeHit::none(ray.t_max());
         let table = cache.table(id);
         let visit = &pin.visit();
@@ -98,14 +98,14 @@ impl Task for ClosestInMesh<'_, '_> {
         {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
-            if let Some(root) = visit.get(slot) {
-                builder.note_root(of, leaf.slot, root);
-                ClosestInPatch { builder, visit, root, of, ray, hit }.run(kernel);
+            if let Some(block) = visit.get(slot) {
+                builder.note_root(of, leaf.slot, block);
+                ClosestInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray }, hit }.run(kernel);
             } else {
                 // Apart, so that a block that is there stays in registers.
-                let root = builder.build_root(visit, slot, of, cache, leaf.slot);
-                builder.note_root(of, leaf.slot, root);
-                kernel.enter(ClosestInPatch { builder, visit, root, of, ray, hit });
+                let block = builder.build_root(visit, slot, of, cache, leaf.slot);
+                builder.note_root(of, leaf.slot, block);
+                kernel.enter(ClosestInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray }, hit });
             }
         }
         hit.is_some().then(|| hit_of(mesh, id, ray.caller_t(hit.t), hit))
@@ -127,20 +127,20 @@ impl Task for OccludedInMesh<'_, '_> {
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
         let Some(entering) = mesh.entrance().ray_in_reach(kernel, ray) else { return false };
-        let ray = &lattice_ray(entering, id, ray, ray.t_max);
+        let ray = &lattice_ray(kernel, entering, id, ray, ray.t_max);
         let table = cache.table(id);
         let visit = &pin.visit();
         let mut walk = mesh.top().walk(&mut stacks.mesh);
         while let Some(leaf) = walk.any(kernel, ray, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
-            let is_hit = if let Some(root) = visit.get(slot) {
-                builder.note_root(of, leaf.slot, root);
-                OccludedInPatch { builder, visit, root, of, ray }.run(kernel)
+            let is_hit = if let Some(block) = visit.get(slot) {
+                builder.note_root(of, leaf.slot, block);
+                OccludedInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray } }.run(kernel)
             } else {
-                let root = builder.build_root(visit, slot, of, cache, leaf.slot);
-                builder.note_root(of, leaf.slot, root);
-                kernel.enter(OccludedInPatch { builder, visit, root, of, ray })
+                let block = builder.build_root(visit, slot, of, cache, leaf.slot);
+                builder.note_root(of, leaf.slot, block);
+                kernel.enter(OccludedInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray } })
             };
             if is_hit {
                 return true;
@@ -236,6 +236,37 @@ impl<'w> Intersector<'w> {
         }
     }
 
+    /// The nearest hit where there are several meshes. (Apart, so that one mesh does not pay for its stack frame.)
+    #[inline(never)]
+    fn closest_of_meshes(&mut self, ray: &Ray) -> Option<Hit> {
+        let mut best = None;
+        let scene_ray = self.scene_ray(ray);
+        let world = self.world;
+        let mut stack = std::mem::take(&mut self.stacks.scene);
+        world.top().closest(simd::Portable, &scene_ray, &mut stack, |leaf, t_max| {
+            self.closest_in_mesh(MeshId(leaf.patch.0), ray, &mut best);
+            if let Some(hit) = best {
+                *t_max = scene_ray.not_below(hit.t);
+            }
+        });
+        self.stacks.scene = stack;
+        best
+    }
+
+    /// Whether anything is hit where there are several meshes.
+    #[inline(never)]
+    fn occluded_by_meshes(&mut self, ray: &Ray) -> bool {
+        let scene_ray = self.scene_ray(ray);
+        let world = self.world;
+        let mut stack = std::mem::take(&mut self.stacks.scene);
+        let hit = world.top().occluded(simd::Portable, &scene_ray, &mut stack, |leaf| {
+            let mesh = MeshId(leaf.patch.0);
+            self.kernel.run(OccludedInMesh { tracer: self, mesh, ray })
+        });
+        self.stacks.scene = stack;
+        hit
+    }
+
     /// The ray in the space of the tree over meshes; its `t` is only good for the order of visits.
     fn scene_ray(&self, ray: &Ray) -> LatticeRay {
         let to = self.world.scene_from_world();
@@ -261,34 +292,16 @@ impl Intersect for Intersector<'_> {
         if self.world.meshes().len() == 1 {
             return self.kernel.run(ClosestInMesh { tracer: self, mesh: MeshId(0), ray, t_max: ray.t_max });
         }
-        let mut best = None;
-        let scene_ray = self.scene_ray(ray);
-        let world = self.world;
-        let mut stack = std::mem::take(&mut self.stacks.scene);
-        world.top().closest(simd::Portable, &scene_ray, &mut stack, |leaf, t_max| {
-            self.closest_in_mesh(MeshId(leaf.patch.0), ray, &mut best);
-            if let Some(hit) = best {
-                *t_max = scene_ray.not_below(hit.t);
-            }
-        });
-        self.stacks.scene = stack;
-        best
+        self.closest_of_meshes(ray)
     }
 
     fn occluded(&mut self, ray: &Ray) -> bool {
-        let occluded_by = |tracer: &mut Self, mesh: MeshId| tracer.kernel.run(OccludedInMesh { tracer, mesh, ray });
         if self.world.meshes().len() == 1 {
-            return occluded_by(self, MeshId(0));
+            return self.kernel.run(OccludedInMesh { tracer: self, mesh: MeshId(0), ray });
         }
-        let scene_ray = self.scene_ray(ray);
-        let world = self.world;
-        let mut stack = std::mem::take(&mut self.stacks.scene);
-        let hit = world
-            .top()
-            .occluded(simd::Portable, &scene_ray, &mut stack, |leaf| occluded_by(self, MeshId(leaf.patch.0)));
-        self.stacks.scene = stack;
-        hit
+        self.occluded_by_meshes(ray)
     }
+
     fn closest_batch(&mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len());
         for (rays, hits) in rays.chunks(MOST_RAYS).zip(hits.chunks_mut(MOST_RAYS)) {

@@ -1,53 +1,60 @@
 //! A ray's way through one patch: from its first block down the nodes to pieces, each block built when it is missing.
 //!
-//! What is done with a block that was just built is apart from the code for blocks that are there: those stay in registers,
-//! and nothing waits for a structure that was put into memory a moment ago.
+//! A node is left for its children in a function of its own only if they are nodes in their turn, which takes a rate above 32,
+//! or had to be built just now. So blocks that are there stay in registers, and nothing waits for a structure that was put
+//! into memory a moment ago.
 
 use super::builder::{Builder, NODE_SIDE, PatchContext, child_cells, child_side};
 use crate::cache::{Block, Slot, Visit};
-use crate::grid::{CellRect, LaneHits, LatticeHit, LatticeRay, NodeView, PieceView, is_node};
-use crate::ids::PatchId;
+use crate::grid::{CellRect, LatticeHit, LatticeRay, NodeView, PieceView, is_node};
 use crate::math::simd::{Kernel, Task};
 
-/// A node on the way down a patch, and which of its children are still to be seen.
-struct Level<'v> {
-    block: Block<'v>,
-    cells: CellRect,
-    side: u32,
-    hits: LaneHits,
-}
-
-/// Levels of nodes above a piece: 8 * 4^5 cells are more than [`crate::subdiv::dice::MAX_RATE`].
-const MAX_LEVELS: usize = 5;
-
-impl<'v> Level<'v> {
-    #[inline(always)]
-    fn new<K: Kernel>(kernel: K, visit: &Visit<'_>, block: Block<'v>, ray: &LatticeRay, t_max: f32) -> Self {
-        let node = NodeView::new(block.bytes());
-        let cells = node.cells();
-        let hits = node.test(kernel, ray, t_max);
-        let mut lanes = hits.mask;
-        while lanes != 0 {
-            visit.prefetch(block.child(lanes.trailing_zeros() as usize));
-            lanes &= lanes - 1;
-        }
-        Self { block, cells, side: child_side(cells), hits }
-    }
-
-    #[inline(always)]
-    fn child(&self, lane: usize) -> (Slot<'v>, CellRect) {
-        let (a, b) = (lane as u32 % NODE_SIDE, lane as u32 / NODE_SIDE);
-        (self.block.child(lane), child_cells(self.cells, self.side, a, b))
-    }
-}
-
-/// Takes the nearest hit of a patch into `hit` if it is nearer than what is there.
-pub(super) struct ClosestInPatch<'a, 'v, 'p, 'w> {
-    pub builder: &'a mut Builder<'w>,
+/// Where in a patch.
+#[derive(Clone, Copy)]
+pub(super) struct InPatch<'a, 'v, 'p> {
     pub visit: &'v Visit<'p>,
-    pub root: Block<'v>,
+    pub block: Block<'v>,
+    /// Nodes above the block.
+    pub depth: usize,
     pub of: PatchContext<'a>,
     pub ray: &'a LatticeRay,
+}
+
+impl<'v> InPatch<'_, 'v, '_> {
+    /// Asks for the blocks of children that are visited after others.
+    #[inline(always)]
+    fn prefetch_children(self, mut lanes: u32) {
+        while lanes != 0 {
+            self.visit.prefetch(self.block.child(lanes.trailing_zeros() as usize));
+            lanes &= lanes - 1;
+        }
+    }
+
+    /// Builds a child's block.
+    #[cold]
+    #[inline(never)]
+    fn build_child(self, builder: &mut Builder<'_>, slot: Slot<'v>, lane: usize) -> Self {
+        let block = builder.build(self.visit, slot, self.of, Some(child_of(NodeView::new(self.block.bytes()), lane)));
+        builder.note_child(self.depth + 1, lane, block);
+        self.below(block)
+    }
+
+    #[inline(always)]
+    fn below(self, block: Block<'v>) -> Self {
+        Self { block, depth: self.depth + 1, ..self }
+    }
+}
+
+/// Cells of a node's child.
+fn child_of(node: NodeView<'_>, lane: usize) -> CellRect {
+    let (a, b) = (lane as u32 % NODE_SIDE, lane as u32 / NODE_SIDE);
+    child_cells(node.cells(), child_side(node.cells()), a, b)
+}
+
+/// Takes the nearest hit of a block and those below into `hit` if it is nearer than what is there.
+pub(super) struct ClosestInPatch<'a, 'v, 'p, 'w> {
+    pub builder: &'a mut Builder<'w>,
+    pub at: InPatch<'a, 'v, 'p>,
     pub hit: &'a mut LatticeHit,
 }
 
@@ -56,52 +63,38 @@ impl Task for ClosestInPatch<'_, '_, '_, '_> {
 
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) {
-        let Self { builder, visit, root, of, ray, hit } = self;
-        if !is_node(root.bytes()) {
-            PieceView::new(root.bytes()).closest(kernel, ray, of.patch, hit);
+        let Self { builder, at, hit } = self;
+        let InPatch { visit, block, ray, of, .. } = at;
+        if !is_node(block.bytes()) {
+            PieceView::new(block.bytes()).closest(kernel, ray, of.patch, hit);
             return;
         }
-        let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
-        levels[0] = Some(Level::new(kernel, visit, root, ray, hit.t));
-        let mut depth = 0;
-        while let Some(level) = &mut levels[depth] {
-            let Some(lane) = level.hits.pop_nearest(hit.t) else {
-                if depth == 0 {
-                    break;
-                }
-                depth -= 1;
-                continue;
-            };
-            let (slot, cells) = level.child(lane);
-            if let Some(block) = visit.get(slot) {
-                builder.note_child(depth + 1, lane, block);
-                if is_node(block.bytes()) {
-                    depth += 1;
-                    levels[depth] = Some(Level::new(kernel, visit, block, ray, hit.t));
+        let mut children = NodeView::new(block.bytes()).test(kernel, ray, hit.t);
+        let Some(mut lane) = children.pop_nearest(hit.t) else { return };
+        at.prefetch_children(children.mask);
+        loop {
+            let slot = block.child(lane);
+            if let Some(child) = visit.get(slot) {
+                builder.note_child(at.depth + 1, lane, child);
+                if is_node(child.bytes()) {
+                    kernel.enter(ClosestInPatch { builder, at: at.below(child), hit });
                 } else {
-                    PieceView::new(block.bytes()).closest(kernel, ray, of.patch, hit);
+                    PieceView::new(child.bytes()).closest(kernel, ray, of.patch, hit);
                 }
             } else {
-                let block = builder.build(visit, slot, of, Some(cells));
-                builder.note_child(depth + 1, lane, block);
-                if is_node(block.bytes()) {
-                    depth += 1;
-                    levels[depth] = Some(kernel.enter(OpenLevel { visit, block, ray, t_max: hit.t }));
-                } else {
-                    kernel.enter(ClosestInPiece { block, patch: of.patch, ray, hit });
-                }
+                let at = at.build_child(builder, slot, lane);
+                kernel.enter(ClosestInPatch { builder, at, hit });
             }
+            let Some(next) = children.pop_nearest(hit.t) else { return };
+            lane = next;
         }
     }
 }
 
-/// Whether the ray hits anything of a patch.
+/// Whether the ray hits anything of a block and those below.
 pub(super) struct OccludedInPatch<'a, 'v, 'p, 'w> {
     pub builder: &'a mut Builder<'w>,
-    pub visit: &'v Visit<'p>,
-    pub root: Block<'v>,
-    pub of: PatchContext<'a>,
-    pub ray: &'a LatticeRay,
+    pub at: InPatch<'a, 'v, 'p>,
 }
 
 impl Task for OccludedInPatch<'_, '_, '_, '_> {
@@ -109,93 +102,32 @@ impl Task for OccludedInPatch<'_, '_, '_, '_> {
 
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> bool {
-        let Self { builder, visit, root, of, ray } = self;
-        if !is_node(root.bytes()) {
-            return PieceView::new(root.bytes()).occluded(kernel, ray, of.patch);
+        let Self { builder, at } = self;
+        let InPatch { visit, block, ray, of, .. } = at;
+        if !is_node(block.bytes()) {
+            return PieceView::new(block.bytes()).occluded(kernel, ray, of.patch);
         }
-        let mut levels: [Option<Level<'_>>; MAX_LEVELS] = Default::default();
-        levels[0] = Some(Level::new(kernel, visit, root, ray, ray.t_max()));
-        let mut depth = 0;
-        while let Some(level) = &mut levels[depth] {
-            let Some(lane) = level.hits.pop() else {
-                if depth == 0 {
-                    break;
+        let mut children = NodeView::new(block.bytes()).lanes_met(kernel, ray, ray.t_max());
+        at.prefetch_children(children & children.wrapping_sub(1));
+        while children != 0 {
+            let lane = children.trailing_zeros() as usize;
+            children &= children - 1;
+            let slot = block.child(lane);
+            let is_hit = if let Some(child) = visit.get(slot) {
+                builder.note_child(at.depth + 1, lane, child);
+                if is_node(child.bytes()) {
+                    kernel.enter(OccludedInPatch { builder, at: at.below(child) })
+                } else {
+                    PieceView::new(child.bytes()).occluded(kernel, ray, of.patch)
                 }
-                depth -= 1;
-                continue;
-            };
-            let (slot, cells) = level.child(lane);
-            let is_hit = if let Some(block) = visit.get(slot) {
-                builder.note_child(depth + 1, lane, block);
-                if is_node(block.bytes()) {
-                    depth += 1;
-                    levels[depth] = Some(Level::new(kernel, visit, block, ray, ray.t_max()));
-                    continue;
-                }
-                PieceView::new(block.bytes()).occluded(kernel, ray, of.patch)
             } else {
-                let block = builder.build(visit, slot, of, Some(cells));
-                builder.note_child(depth + 1, lane, block);
-                if is_node(block.bytes()) {
-                    depth += 1;
-                    levels[depth] = Some(kernel.enter(OpenLevel { visit, block, ray, t_max: ray.t_max() }));
-                    continue;
-                }
-                kernel.enter(OccludedInPiece { block, patch: of.patch, ray })
+                let at = at.build_child(builder, slot, lane);
+                kernel.enter(OccludedInPatch { builder, at })
             };
             if is_hit {
                 return true;
             }
         }
         false
-    }
-}
-
-// What is done with a block that was just built, apart from the code for blocks that are there.
-
-struct OpenLevel<'a, 'v, 'p> {
-    pub visit: &'v Visit<'p>,
-    block: Block<'v>,
-    pub ray: &'a LatticeRay,
-    t_max: f32,
-}
-
-impl<'v> Task for OpenLevel<'_, 'v, '_> {
-    type Output = Level<'v>;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> Level<'v> {
-        Level::new(kernel, self.visit, self.block, self.ray, self.t_max)
-    }
-}
-
-struct ClosestInPiece<'a, 'v> {
-    block: Block<'v>,
-    patch: PatchId,
-    pub ray: &'a LatticeRay,
-    pub hit: &'a mut LatticeHit,
-}
-
-impl Task for ClosestInPiece<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) {
-        PieceView::new(self.block.bytes()).closest(kernel, self.ray, self.patch, self.hit);
-    }
-}
-
-struct OccludedInPiece<'a, 'v> {
-    block: Block<'v>,
-    patch: PatchId,
-    pub ray: &'a LatticeRay,
-}
-
-impl Task for OccludedInPiece<'_, '_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> bool {
-        PieceView::new(self.block.bytes()).occluded(kernel, self.ray, self.patch)
     }
 }

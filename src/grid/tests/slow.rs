@@ -36,7 +36,7 @@ pub struct Meeting {
 
 /// The ray as the kernels know it: rounded origin and direction.
 pub fn rounded(ray: &LatticeRay) -> (DVec3, DVec3) {
-    let [kx, ky, kz] = ray.axes;
+    let [kx, ky, kz] = ray.sides.axes.map(|axis| axis as usize);
     let mut d = [0.0; 3];
     d[kz] = 1.0 / f64::from(ray.inv[kz]);
     d[kx] = f64::from(ray.shear[0]) * d[kz];

@@ -66,7 +66,7 @@ fn aimed(random: &mut Random, vertices: &[[i32; 3]], width: f64, round: usize) -
 
 /// How far, across the ray, the kernels may be off: the perturbation of vertices in `LatticeRay`'s argument, and a little.
 fn blur(ray: &LatticeRay, width: f64) -> f64 {
-    let far = ray.near_origin.iter().fold(0.0f64, |m, o| m.max(f64::from(o.abs())));
+    let far = ray.near_origin[..3].iter().fold(0.0f64, |m, o| m.max(f64::from(o.abs())));
     (far + 1.7e7) * 8.0 * f64::powi(2.0, -24) + 1e-6 * width
 }
 

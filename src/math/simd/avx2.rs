@@ -1,7 +1,7 @@
 //! The kernel of AVX2 registers.
 #![allow(unsafe_code)]
 
-use super::{Kernel, Task};
+use super::{Kernel, SET_LANES, Task};
 use std::arch::x86_64::*;
 
 /// Eight lanes in one register. A value of this type proves that the processor has AVX2 (and the small extensions that came with it).
@@ -101,6 +101,37 @@ impl Kernel for Avx2 {
         in_registers!(_mm256_shuffle_ps::<0b01_00_10_01>(a, b))
     }
     #[inline(always)]
+    fn shuffle<const PICK: i32>(self, x: __m256) -> __m256 {
+        in_registers!(_mm256_permute_ps::<PICK>(x))
+    }
+    #[inline(always)]
+    fn abs(self, x: __m256) -> __m256 {
+        in_registers!(_mm256_andnot_ps(_mm256_set1_ps(-0.0), x))
+    }
+    #[inline(always)]
+    fn with_sign(self, magnitude: __m256, sign: __m256) -> __m256 {
+        in_registers!(_mm256_or_ps(magnitude, _mm256_and_ps(_mm256_set1_ps(-0.0), sign)))
+    }
+    #[inline(always)]
+    fn negative(self, x: __m256) -> u32 {
+        in_registers!(_mm256_movemask_ps(x) as u32)
+    }
+    #[inline(always)]
+    fn floats_twice(self, x: &[i32; 4]) -> __m256 {
+        // SAFETY: `self` proves AVX2; `x` is 16 readable bytes and the load needs no alignment.
+        unsafe { _mm256_cvtepi32_ps(_mm256_broadcastsi128_si256(_mm_loadu_si128(x.as_ptr().cast()))) }
+    }
+    #[inline(always)]
+    fn scaled_twice(self, scale: __m256, powers: i32) -> __m256 {
+        in_registers!({
+            // Byte k moved to where floats have their exponents, and added to that of lane k.
+            let places = _mm256_setr_epi32(23, 15, 7, 0, 23, 15, 7, 0);
+            let bytes = _mm256_sllv_epi32(_mm256_set1_epi32(powers), places);
+            let exponents = _mm256_and_si256(bytes, _mm256_set1_epi32(0xff << 23));
+            _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(scale), exponents))
+        })
+    }
+    #[inline(always)]
     fn splat4(self, x: f64) -> __m256d {
         in_registers!(_mm256_set1_pd(x))
     }
@@ -139,6 +170,24 @@ impl Kernel for Avx2 {
     #[inline(always)]
     fn max4(self, a: __m256d, b: __m256d) -> __m256d {
         in_registers!(_mm256_max_pd(a, b))
+    }
+    #[inline(always)]
+    fn abs4(self, x: __m256d) -> __m256d {
+        in_registers!(_mm256_andnot_pd(_mm256_set1_pd(-0.0), x))
+    }
+    #[inline(always)]
+    fn greatest_of_three(self, x: __m256d) -> f64 {
+        in_registers!({
+            let (xy, z) = (_mm256_castpd256_pd128(x), _mm256_extractf128_pd::<1>(x));
+            _mm_cvtsd_f64(_mm_max_sd(_mm_max_sd(xy, z), _mm_unpackhi_pd(xy, xy)))
+        })
+    }
+    #[inline(always)]
+    fn floats_of(self, x: __m256d) -> __m256 {
+        in_registers!({
+            let four = _mm256_cvtpd_ps(x);
+            _mm256_set_m128(four, four)
+        })
     }
     #[inline(always)]
     fn floor4(self, x: __m256d) -> __m256d {
@@ -200,6 +249,17 @@ impl Kernel for Avx2 {
             let packed = _mm256_shuffle_epi8(x, _mm256_broadcastsi128_si256(places));
             _mm_storeu_si128(out[0].as_mut_ptr().cast(), _mm256_castsi256_si128(packed));
             _mm_storeu_si128(out[1].as_mut_ptr().cast(), _mm256_extracti128_si256::<1>(packed));
+        }
+        out
+    }
+    #[inline(always)]
+    fn packed(self, x: &[u32; 8], mask: u8) -> [u32; 8] {
+        let mut out = [0; 8];
+        // SAFETY: `self` proves AVX2; `x` is 32 readable bytes, the list of lanes 8, and `out` is 32 writable ones; nothing needs alignment.
+        unsafe {
+            let lanes = _mm256_cvtepu8_epi32(_mm_loadl_epi64(SET_LANES[usize::from(mask)].as_ptr().cast()));
+            let packed = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(x.as_ptr().cast()), lanes);
+            _mm256_storeu_si256(out.as_mut_ptr().cast(), packed);
         }
         out
     }

@@ -58,6 +58,19 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn pick_0112(self, a: Self::F, b: Self::F) -> Self::F;
     /// In each half of four lanes, `[a1, a2, b0, b1]`.
     fn pick_1201(self, a: Self::F, b: Self::F) -> Self::F;
+    /// In each half of four lanes, lane `PICK >> 2 k & 3` of that half in place k.
+    fn shuffle<const PICK: i32>(self, x: Self::F) -> Self::F;
+    /// Lanewise without the sign.
+    fn abs(self, x: Self::F) -> Self::F;
+    /// Lanewise `magnitude`, which is not negative, with the sign of `sign`.
+    fn with_sign(self, magnitude: Self::F, sign: Self::F) -> Self::F;
+    /// Bit k is set where lane k has the sign bit.
+    fn negative(self, x: Self::F) -> u32;
+    /// Four integers as floats, in each half.
+    fn floats_twice(self, x: &[i32; 4]) -> Self::F;
+    /// In each half, lanes 0 to 2 of `scale` times two to the power of byte 0 to 2 of `powers`; the fourth lane is any number. `scale` and
+    /// the result are neither zero, subnormal nor infinite.
+    fn scaled_twice(self, scale: Self::F, powers: i32) -> Self::F;
 
     /// `x` in every lane.
     fn splat4(self, x: f64) -> Self::D;
@@ -77,6 +90,12 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn min4(self, a: Self::D, b: Self::D) -> Self::D;
     /// Lanewise `if a > b { a } else { b }`.
     fn max4(self, a: Self::D, b: Self::D) -> Self::D;
+    /// Lanewise without the sign.
+    fn abs4(self, x: Self::D) -> Self::D;
+    /// The greatest of lanes 0 to 2, none of which is NaN.
+    fn greatest_of_three(self, x: Self::D) -> f64;
+    /// The lanes rounded to floats, in each half.
+    fn floats_of(self, x: Self::D) -> Self::F;
     /// Lanewise the greatest whole number that is not above.
     fn floor4(self, x: Self::D) -> Self::D;
     /// Bit k is set where `a < b` in lane k.
@@ -102,6 +121,8 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn even_lanes(self, a: Self::I, b: Self::I) -> Self::I;
     /// The lower three bytes of each lane in little-endian order, those of four lanes together and four zeros after them.
     fn lower_threes(self, x: Self::I) -> [[u8; 16]; 2];
+    /// Lanes of 32 bits, those first whose bits are set in `mask`, in their order; then lane 0 again and again.
+    fn packed(self, x: &[u32; 8], mask: u8) -> [u32; 8];
     /// The lower halves of the lanes.
     fn lower_halves(self, x: Self::I) -> [u16; 8];
 
@@ -118,6 +139,24 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     /// Asks for the cache line of `x`, which may be any address.
     fn prefetch<T>(self, x: *const T);
 }
+
+/// For every mask the lanes whose bits are set.
+static SET_LANES: [[u8; 8]; 256] = {
+    let mut table = [[0; 8]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut lane, mut n) = (0, 0);
+        while lane < 8 {
+            if mask >> lane & 1 == 1 {
+                table[mask][n] = lane as u8;
+                n += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    table
+};
 
 /// Work that is compiled once for every kernel. Mark `run` `#[inline(always)]`.
 pub trait Task {

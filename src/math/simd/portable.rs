@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code)]
 
-use super::{Kernel, Task};
+use super::{Kernel, SET_LANES, Task};
 use std::array::from_fn;
 
 /// Eight lanes as an array of floats.
@@ -86,6 +86,31 @@ impl Kernel for Portable {
         [a[1], a[2], b[0], b[1], a[5], a[6], b[4], b[5]]
     }
     #[inline(always)]
+    fn shuffle<const PICK: i32>(self, x: [f32; 8]) -> [f32; 8] {
+        from_fn(|k| x[(k & 4) + (PICK >> (2 * (k & 3)) & 3) as usize])
+    }
+    #[inline(always)]
+    fn abs(self, x: [f32; 8]) -> [f32; 8] {
+        x.map(f32::abs)
+    }
+    #[inline(always)]
+    fn with_sign(self, magnitude: [f32; 8], sign: [f32; 8]) -> [f32; 8] {
+        zip(magnitude, sign, f32::copysign)
+    }
+    #[inline(always)]
+    fn negative(self, x: [f32; 8]) -> u32 {
+        mask(x, x, |x, _| x.is_sign_negative())
+    }
+    #[inline(always)]
+    fn floats_twice(self, x: &[i32; 4]) -> [f32; 8] {
+        from_fn(|k| x[k & 3] as f32)
+    }
+    #[inline(always)]
+    fn scaled_twice(self, scale: [f32; 8], powers: i32) -> [f32; 8] {
+        let power = |k: usize| f32::from_bits((127 + u32::from(powers.to_le_bytes()[k])) << 23);
+        from_fn(|k| scale[k] * if k & 3 == 3 { 1.0 } else { power(k & 3) })
+    }
+    #[inline(always)]
     fn splat4(self, x: f64) -> [f64; 4] {
         [x; 4]
     }
@@ -120,6 +145,19 @@ impl Kernel for Portable {
     #[inline(always)]
     fn max4(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
         zip4(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn abs4(self, x: [f64; 4]) -> [f64; 4] {
+        x.map(f64::abs)
+    }
+    #[inline(always)]
+    fn greatest_of_three(self, x: [f64; 4]) -> f64 {
+        let greater = |a: f64, b: f64| if a > b { a } else { b };
+        greater(greater(x[0], x[2]), x[1])
+    }
+    #[inline(always)]
+    fn floats_of(self, x: [f64; 4]) -> [f32; 8] {
+        from_fn(|k| x[k & 3] as f32)
     }
     #[inline(always)]
     fn floor4(self, x: [f64; 4]) -> [f64; 4] {
@@ -165,6 +203,10 @@ impl Kernel for Portable {
     fn lower_threes(self, x: [i32; 8]) -> [[u8; 16]; 2] {
         let byte = |lane: usize, i: usize| x[lane].to_le_bytes()[i];
         from_fn(|half| from_fn(|i| if i < 12 { byte(4 * half + i / 3, i % 3) } else { 0 }))
+    }
+    #[inline(always)]
+    fn packed(self, x: &[u32; 8], mask: u8) -> [u32; 8] {
+        SET_LANES[usize::from(mask)].map(|lane| x[usize::from(lane)])
     }
     #[inline(always)]
     fn lower_halves(self, x: [i32; 8]) -> [u16; 8] {

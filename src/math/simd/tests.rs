@@ -38,10 +38,19 @@ impl Task for Round {
             k.pick_1201(a, b),
             k.splat(self.0 as f32),
             k.widen(&eight),
+            k.shuffle::<0b01_11_10_00>(a),
+            k.shuffle::<0b10_10_01_01>(b),
+            k.abs(a),
+            k.with_sign(k.abs(a), b),
+            k.floats_twice(&[self.0 as i32, -3, i32::MIN, i32::MAX - self.0 as i32]),
+            k.shuffle::<0b00_10_01_00>(
+                k.scaled_twice(k.splat(self.0 as f32 - 7.5), i32::from_le_bytes([bytes[0] / 4, 0, 17, 99])),
+            ),
+            k.floats_of(k.load4(&std::array::from_fn(|i| f64::from(awkward(self.0)[i]) * 1.1))),
         ];
         let canonical = |x: f32| if x.is_nan() { f32::NAN.to_bits() } else { x.to_bits() };
         let lanes = floats.into_iter().chain(integers).flat_map(|f| k.store(f).map(canonical));
-        lanes.chain([k.le(a, b), k.eq(a, b)]).collect()
+        lanes.chain([k.le(a, b), k.eq(a, b), k.negative(k.abs(a)), k.negative(b)]).collect()
     }
 }
 
@@ -70,13 +79,19 @@ impl Task for RoundOfDoubles {
             k.min4(a, b),
             k.max4(a, b),
             k.floor4(a),
+            k.abs4(a),
         ];
         let canonical = |x: f64| if x.is_nan() { f64::NAN.to_bits() } else { x.to_bits() };
         let doubles = doubles.into_iter().chain(k.transpose4([a, b, k.floor4(a), k.splat4(7.0)]));
         let whole = k.floor4(k.splat4(f64::from(self.0) * 7.3 - 3e5));
         let integers = [k.nearest4(whole), k.nearest4(k.load4(&[0.5, 1.5, -2.5, 2.5 + f64::from(self.0)]))];
+        let numbers = awkward(self.0).map(|x| if x.is_nan() { 2.0 } else { x });
+        let greatest = k.greatest_of_three(k.load4(&numbers)).to_bits();
         let lanes = doubles.flat_map(|d| k.store4(d).map(canonical));
-        lanes.chain(integers.into_iter().flatten().map(|i| i as u64)).chain([u64::from(k.lt4(a, b))]).collect()
+        lanes
+            .chain(integers.into_iter().flatten().map(|i| i as u64))
+            .chain([u64::from(k.lt4(a, b)), greatest])
+            .collect()
     }
 }
 
@@ -105,6 +120,7 @@ impl Task for RoundOfIntegers {
             out.extend(k.lower_halves(x).map(i32::from));
             out.extend(k.lower_threes(x).into_iter().flatten().map(i32::from));
         }
+        out.extend(k.packed(&some(self.0).map(|x| x as u32), self.0 as u8).map(|x| x as i32));
         out
     }
 }

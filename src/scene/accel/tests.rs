@@ -124,7 +124,7 @@ fn leaves_beyond_a_hit_are_not_visited() {
     let mut n_visits = [0; 2];
     for i in 0..200 {
         let ray = ray(random_point(i, 8e6), random_point(i + 1000, 1.0));
-        let direction = DVec3::from_array(ray.inv.map(|x| 1.0 / f64::from(x)));
+        let direction = DVec3::from_array(std::array::from_fn(|k| 1.0 / f64::from(ray.inv[k])));
         let origin = ray.origin();
         tree.closest(Portable, &ray, &mut stack, |leaf, t_max| {
             let t = entry(&boxes[leaf.patch.idx()].expanded(64.0), origin, direction).expect("the box is met");

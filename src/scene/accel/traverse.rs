@@ -66,6 +66,11 @@ impl TopLevel {
         false
     }
 
+    #[inline(always)]
+    fn node(&self, node: u32) -> (&NodeBoxes, &Refs) {
+        (&self.nodes.boxes[node as usize], &self.nodes.refs[node as usize])
+    }
+
     /// Asks for what a target leads to.
     #[inline(always)]
     fn prefetch<K: Kernel>(&self, k: K, target: u32, leaf: &impl Fn(u32)) {
@@ -143,7 +148,7 @@ impl Walk<'_> {
         prefetch: &impl Fn(u32),
     ) -> Option<u32> {
         let tree = self.tree;
-        let (boxes, refs) = (&tree.nodes.boxes[node as usize], &tree.nodes.refs[node as usize]);
+        let (boxes, refs) = tree.node(node);
         let (mask, t_near) = boxes.test(k, ray, t_max);
         if mask == 0 {
             return None;
@@ -186,23 +191,32 @@ impl Walk<'_> {
     pub fn any<K: Kernel>(&mut self, kernel: K, ray: &LatticeRay, prefetch: impl Fn(u32)) -> Option<LeafRef> {
         while self.n > 0 {
             self.n -= 1;
-            let node = self.stack[self.n] as u32;
-            if node & LEAF != 0 {
-                return Some(self.tree.leaf(node));
-            }
-            let tree = self.tree;
-            let (boxes, refs) = (&tree.nodes.boxes[node as usize], &tree.nodes.refs[node as usize]);
-            let (mut mask, _) = boxes.test(kernel, ray, ray.t_max);
-            let room: &mut [Entry; LANES] = self.stack[self.n..].first_chunk_mut().expect("room for a node's lanes");
-            let mut n = 0;
-            while mask != 0 {
-                let target = tree.target(node, refs, mask.trailing_zeros() as usize % LANES);
+            let mut target = self.stack[self.n] as u32;
+            while target & LEAF == 0 {
+                let (boxes, refs) = self.tree.node(target);
+                let (mut mask, _) = boxes.test(kernel, ray, ray.t_max);
+                if mask == 0 {
+                    break;
+                }
+                // The first child next, the others later.
+                let node = target;
+                target = self.tree.target(node, refs, mask.trailing_zeros() as usize % LANES);
                 mask &= mask - 1;
-                tree.prefetch(kernel, target, &prefetch);
-                room[n % LANES] = entry(0.0, target);
-                n += 1;
+                let room: &mut [Entry; LANES] =
+                    self.stack[self.n..].first_chunk_mut().expect("room for a node's lanes");
+                let mut n = 0;
+                while mask != 0 {
+                    let later = self.tree.target(node, refs, mask.trailing_zeros() as usize % LANES);
+                    mask &= mask - 1;
+                    self.tree.prefetch(kernel, later, &prefetch);
+                    room[n % LANES] = entry(0.0, later);
+                    n += 1;
+                }
+                self.n += n;
             }
-            self.n += n;
+            if target & LEAF != 0 {
+                return Some(self.tree.leaf(target));
+            }
         }
         None
     }
@@ -215,8 +229,8 @@ impl NodeBoxes {
         let (mut enter, mut leave) = (k.splat(0.0), k.splat(t_max));
         for axis in 0..3 {
             let inv = k.splat(ray.inv[axis]);
-            enter = k.max(self.plane_t(k, ray.near_planes[axis], ray.near_origin[axis], inv), enter);
-            leave = k.min(self.plane_t(k, ray.far_planes[axis], ray.far_origin[axis], inv), leave);
+            enter = k.max(self.plane_t(k, ray.sides.near[axis], ray.near_origin[axis], inv), enter);
+            leave = k.min(self.plane_t(k, ray.sides.far[axis], ray.far_origin[axis], inv), leave);
         }
         (k.le(enter, leave), enter)
     }
@@ -224,7 +238,9 @@ impl NodeBoxes {
     /// t of one plane of all lanes.
     #[inline(always)]
     fn plane_t<K: Kernel>(&self, k: K, plane: Plane, origin: f32, inv: K::F) -> K::F {
-        k.mul(k.sub(k.load(&self.planes[plane as usize]), k.splat(origin)), inv)
+        let pairs: &[[f32; 2]; 24] = bytemuck::cast_ref(&self.planes);
+        let four: &[[f32; 2]; 4] = pairs[plane.index()..plane.index() + 4].try_into().expect("four pairs");
+        k.mul(k.sub(k.load(bytemuck::cast_ref(four)), k.splat(origin)), inv)
     }
 }
 
