@@ -130,8 +130,8 @@ impl Task for OccludedInMesh<'_, '_> {
         let ray = &lattice_ray(kernel, entering, id, ray, ray.t_max);
         let table = cache.table(id);
         let visit = &pin.visit();
-        let mut walk = mesh.top().walk(&mut stacks.mesh);
-        while let Some(leaf) = walk.any(kernel, ray, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
+        let mut walk = mesh.top().walk_any(&mut stacks.mesh);
+        while let Some(leaf) = walk.next(kernel, ray, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let slot = visit.root(table, SlotId(leaf.slot));
             let is_hit = if let Some(block) = visit.get(slot) {

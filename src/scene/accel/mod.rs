@@ -30,7 +30,7 @@ mod visit;
 use crate::ids::PatchId;
 
 pub use build::BUILD_BYTES_PER_PATCH;
-pub use traverse::{TraversalStack, Walk};
+pub use traverse::{AnyWalk, TraversalStack, Walk};
 
 /// A leaf of the tree.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

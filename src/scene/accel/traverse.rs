@@ -5,10 +5,11 @@ use crate::grid::{LatticeRay, Plane};
 use crate::ids::PatchId;
 use crate::math::simd::Kernel;
 
-/// The stack of a traversal, kept by each thread so that no ray allocates.
+/// The stacks of traversals, kept by each thread so that no ray allocates.
 #[derive(Clone, Debug, Default)]
 pub struct TraversalStack {
     entries: Vec<Entry>,
+    nodes: Vec<u32>,
 }
 
 /// Something to visit: bits of the t of entry above, `LEAF | slot` or an inner node below. t >= 0, so entries are ordered by t.
@@ -30,7 +31,15 @@ impl TopLevel {
     pub fn walk<'t>(&'t self, stack: &'t mut TraversalStack) -> Walk<'t> {
         let entries = stack.of_size(self.stack_need + LANES);
         entries[0] = entry(0.0, 0);
-        Walk { tree: self, stack: entries, n: 1 }
+        Walk { tree: self, nodes: self.nodes(), stack: entries, n: 1 }
+    }
+
+    /// A walk along a ray in any order, at its start.
+    #[inline(always)]
+    pub fn walk_any<'t>(&'t self, stack: &'t mut TraversalStack) -> AnyWalk<'t> {
+        let stack = stack.nodes_of_size(self.stack_need + LANES);
+        stack[0] = END;
+        AnyWalk { nodes: self.nodes(), stack, n: 1, next: 0, node: 0, leaves: 0 }
     }
 
     /// Calls `visit` for the patches whose boxes the ray meets, the nearest of each node first, until the rest lie beyond
@@ -57,8 +66,8 @@ impl TopLevel {
         stack: &mut TraversalStack,
         mut visit: impl FnMut(LeafRef) -> bool,
     ) -> bool {
-        let mut walk = self.walk(stack);
-        while let Some(leaf) = walk.any(kernel, ray, |_| ()) {
+        let mut walk = self.walk_any(stack);
+        while let Some(leaf) = walk.next(kernel, ray, |_| ()) {
             if visit(leaf) {
                 return true;
             }
@@ -66,9 +75,11 @@ impl TopLevel {
         false
     }
 
+    /// The nodes, both lists cut to one length, so that one comparison checks both.
     #[inline(always)]
-    fn node(&self, node: u32) -> (&NodeBoxes, &Refs) {
-        (&self.nodes.boxes[node as usize], &self.nodes.refs[node as usize])
+    fn nodes(&self) -> (&[NodeBoxes], &[Refs]) {
+        let refs = &self.nodes.refs[..];
+        (&self.nodes.boxes[..refs.len()], refs)
     }
 
     /// Asks for what a target leads to.
@@ -104,6 +115,7 @@ impl TopLevel {
 /// It hands out leaves instead of calling back: code with vector instructions in a closure would be compiled without them.
 pub struct Walk<'t> {
     tree: &'t TopLevel,
+    nodes: (&'t [NodeBoxes], &'t [Refs]),
     stack: &'t mut [Entry],
     /// Entries on the stack.
     n: usize,
@@ -148,7 +160,7 @@ impl Walk<'_> {
         prefetch: &impl Fn(u32),
     ) -> Option<u32> {
         let tree = self.tree;
-        let (boxes, refs) = tree.node(node);
+        let (boxes, refs) = (&self.nodes.0[node as usize], &self.nodes.1[node as usize]);
         let (mask, t_near) = boxes.test(k, ray, t_max);
         if mask == 0 {
             return None;
@@ -185,40 +197,70 @@ impl Walk<'_> {
         self.n += n - 1;
         Some(announced_leaf(room[(n - 1) % LANES] as u32, prefetch))
     }
+}
 
-    /// The next patch whose box the ray meets, in any order.
+/// A ray's way through the tree in any order.
+///
+/// What a processor guesses wrong most often is how many children a ray meets and what they are. So a node's leaves are handed
+/// out from a mask, and all inner children but one go onto the stack at once. Which node comes next is left to a branch: what
+/// follows a right guess need not wait for the test of the boxes. Measured at rate 16: occlusion rays on bigguy and monsterfrog
+/// 1.04 times as fast as from a stack of both, on trex 1.04 times; 0.97 times on the two where the next node was selected without a branch.
+pub struct AnyWalk<'t> {
+    nodes: (&'t [NodeBoxes], &'t [Refs]),
+    /// Inner nodes to be visited, above one [`END`].
+    stack: &'t mut [u32],
+    /// Entries on the stack.
+    n: usize,
+    /// The node that is visited next, or [`END`].
+    next: u32,
+    /// The node visited last, and which of its leaves the ray meets and were not handed out.
+    node: u32,
+    leaves: u32,
+}
+
+/// In place of a node: there are no more.
+const END: u32 = u32::MAX;
+
+impl AnyWalk<'_> {
+    /// The next patch whose box the ray meets.
     #[inline(always)]
-    pub fn any<K: Kernel>(&mut self, kernel: K, ray: &LatticeRay, prefetch: impl Fn(u32)) -> Option<LeafRef> {
-        while self.n > 0 {
-            self.n -= 1;
-            let mut target = self.stack[self.n] as u32;
-            while target & LEAF == 0 {
-                let (boxes, refs) = self.tree.node(target);
-                let (mut mask, _) = boxes.test(kernel, ray, ray.t_max);
-                if mask == 0 {
-                    break;
-                }
-                // The first child next, the others later.
-                let node = target;
-                target = self.tree.target(node, refs, mask.trailing_zeros() as usize % LANES);
-                mask &= mask - 1;
-                let room: &mut [Entry; LANES] =
-                    self.stack[self.n..].first_chunk_mut().expect("room for a node's lanes");
-                let mut n = 0;
-                while mask != 0 {
-                    let later = self.tree.target(node, refs, mask.trailing_zeros() as usize % LANES);
-                    mask &= mask - 1;
-                    self.tree.prefetch(kernel, later, &prefetch);
-                    room[n % LANES] = entry(0.0, later);
-                    n += 1;
-                }
-                self.n += n;
+    pub fn next<K: Kernel>(&mut self, kernel: K, ray: &LatticeRay, prefetch: impl Fn(u32)) -> Option<LeafRef> {
+        while self.leaves == 0 {
+            if self.next == END {
+                return None;
             }
-            if target & LEAF != 0 {
-                return Some(self.tree.leaf(target));
-            }
+            self.visit(kernel, ray);
         }
-        None
+        let lane = self.leaves.trailing_zeros() % LANES as u32;
+        self.leaves &= self.leaves - 1;
+        let slot = self.node * LANES as u32 + lane;
+        if self.leaves != 0 {
+            prefetch(slot - lane + self.leaves.trailing_zeros());
+        }
+        let refs = &self.nodes.1[self.node as usize];
+        Some(LeafRef { slot, patch: PatchId(refs[lane as usize] & !LEAF) })
+    }
+
+    /// Visits the next node, and says which one comes after it.
+    #[inline(always)]
+    fn visit<K: Kernel>(&mut self, k: K, ray: &LatticeRay) {
+        let (boxes, refs) = (&self.nodes.0[self.next as usize], &self.nodes.1[self.next as usize]);
+        let (met, _) = boxes.test(k, ray, ray.t_max);
+        let leaves = k.negative(k.load(bytemuck::cast_ref(refs)));
+        let inner = met & !leaves;
+        (self.node, self.leaves) = (self.next, met & leaves);
+        if inner == 0 {
+            self.n -= 1;
+            self.next = self.stack[self.n];
+            return;
+        }
+        self.next = refs[inner.trailing_zeros() as usize % LANES];
+        let others = inner & (inner - 1);
+        if others != 0 {
+            let room: &mut [u32; LANES] = self.stack[self.n..].first_chunk_mut().expect("room for a node's lanes");
+            *room = k.packed(refs, others as u8);
+            self.n += others.count_ones() as usize;
+        }
     }
 }
 
@@ -252,6 +294,15 @@ impl TraversalStack {
             self.entries.resize(need, 0);
         }
         &mut self.entries
+    }
+
+    /// The stack of nodes alone, with room for `need`.
+    #[inline(always)]
+    fn nodes_of_size(&mut self, need: usize) -> &mut [u32] {
+        if self.nodes.len() < need {
+            self.nodes.resize(need, 0);
+        }
+        &mut self.nodes
     }
 }
 
