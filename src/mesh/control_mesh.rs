@@ -81,7 +81,7 @@ pub struct ControlMesh {
     pub face_sizes: Vec<u32>,
     /// Vertices of all faces, one face after the other.
     pub face_vertices: Vec<VertexId>,
-    /// Texture coordinates, if every face has them.
+    /// Texture coordinates, if every face has them. They go from file to file; nothing that is traced has any.
     pub tex_coords: Option<TexCoords>,
     /// Sharp edges; a tag on a pair that is no edge has no effect.
     pub creases: Vec<Crease>,
@@ -160,11 +160,6 @@ impl ControlMesh {
     pub fn bytes(&self) -> usize {
         let tex_coords = self.tex_coords.as_ref().map_or(0, TexCoords::bytes);
         size_of_val(&*self.positions) + size_of_val(&*self.face_sizes) + size_of_val(&*self.face_vertices) + tex_coords
-    }
-
-    /// The texture coordinates alone.
-    pub fn into_tex_coords(self) -> Option<TexCoords> {
-        self.tex_coords
     }
 
     /// Number of faces.

@@ -70,7 +70,7 @@ impl Tracer for AnalyticTracer {
         let t = shape.meet(ray, start).unwrap_or(f64::from(hit.t));
         let position = ray.origin + t * ray.direction;
         let normal = shape.normal(position).normalize();
-        SurfacePoint { position, geometric_normal: normal, shading_normal: normal, tex_coord: None, clearance: 1e-9 }
+        SurfacePoint { position, geometric_normal: normal, shading_normal: normal, clearance: 1e-9 }
     }
 
     fn patch_rate(&self, _: &PrimitiveRef) -> u32 {

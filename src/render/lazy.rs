@@ -14,7 +14,7 @@ use super::tracer::{Built, SurfacePoint, Tracer};
 use crate::math::{Hit, OnTriangle, PrimitiveRef, Ray};
 use crate::scene::intersect::Intersector;
 use crate::scene::world::WorldMesh;
-use glam::{DVec3, Vec2};
+use glam::DVec3;
 
 /// How wrong a triangle's neighbours can seem from a point on it, as a share of its size.
 const RELATIVE_ERROR: f64 = 1.0 / (1 << 20) as f64;
@@ -42,7 +42,7 @@ impl Tracer for Intersector<'_> {
             None => geometric_normal,
         };
         let (position, clearance) = start(mesh, &hit.on_triangle, geometric_normal);
-        SurfacePoint { position, geometric_normal, shading_normal, tex_coord: tex_coord(mesh, hit), clearance }
+        SurfacePoint { position, geometric_normal, shading_normal, clearance }
     }
 
     fn patch_rate(&self, primitive: &PrimitiveRef) -> u32 {
@@ -88,24 +88,6 @@ fn off_the_edges([a, b, c]: [DVec3; 3], [second, third]: [f32; 2], distance: f64
         weights[k].max(if least < 0.25 { least } else { 0.25 })
     });
     raised.map(|weight| weight / raised.iter().sum::<f64>())
-}
-
-/// Bilinear over a quad; over a polygon's sub-quad between its corner, the middles of its sides and its centre.
-fn tex_coord(mesh: &WorldMesh, hit: &Hit) -> Option<Vec2> {
-    let tex_coords = mesh.tex_coords()?;
-    let surface = mesh.surface();
-    let (first, n) = surface.face_corners(hit.face);
-    let corner = |k: u32| tex_coords.values[tex_coords.indices[(first + k % n) as usize] as usize];
-    let quad = if n == 4 {
-        [corner(0), corner(1), corner(2), corner(3)]
-    } else {
-        let center = (0..n).map(corner).sum::<Vec2>() / n as f32;
-        let [own, after, before] = [corner(hit.sub), corner(hit.sub + 1), corner(hit.sub + n - 1)];
-        [own, 0.5 * (own + after), center, 0.5 * (own + before)]
-    };
-    let bottom = quad[0].lerp(quad[1], hit.u);
-    let top = quad[3].lerp(quad[2], hit.u);
-    Some(bottom.lerp(top, hit.v))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What integrators ask of the scene.
 
 use crate::math::{Hit, Intersect, PrimitiveRef, Ray};
-use glam::{DVec3, Vec2};
+use glam::DVec3;
 
 /// The surface at a hit, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,8 +12,6 @@ pub struct SurfacePoint {
     pub geometric_normal: DVec3,
     /// Unit normal of the limit surface, on the same side.
     pub shading_normal: DVec3,
-    /// Texture coordinates, if the mesh has them.
-    pub tex_coord: Option<Vec2>,
     /// How far from `position`, in world units along the normal, rays that leave the surface start, so that they do not
     /// meet it again.
     pub clearance: f64,

@@ -1,7 +1,7 @@
 //! What a scene consists of and what it needs, before anything is rendered.
 
 use super::quantity::{Bytes, Count, plural};
-use crate::mesh::{ControlMesh, TexCoords};
+use crate::mesh::ControlMesh;
 use crate::scene::world::{FullTessellation, World, WorldMesh};
 use crate::topology::{HalfEdges, MeshCounts, NONE, Topology};
 use serde::Serialize;
@@ -65,8 +65,6 @@ pub struct Resident {
     pub patches_and_trees: usize,
     /// A slot of the cache for each lane of the trees over patches.
     pub slots: usize,
-    /// Texture coordinates, as the files have them.
-    pub tex_coords: usize,
     /// All of it.
     pub total: usize,
     /// All of it by the number of control faces.
@@ -105,7 +103,7 @@ impl Inventory {
         let r = &mut self.resident;
         r.slots = slot_bytes;
         r.total = world.bytes() + slot_bytes;
-        r.patches_and_trees = world.bytes() - r.topology - r.control_points - r.plans - r.tex_coords;
+        r.patches_and_trees = world.bytes() - r.topology - r.control_points - r.plans;
         r.per_face = r.total as f64 / self.faces.max(1) as f64;
     }
 
@@ -115,7 +113,6 @@ impl Inventory {
         self.resident.topology += topology.bytes();
         self.resident.control_points += surface.control_bytes();
         self.resident.plans += surface.plans().bytes();
-        self.resident.tex_coords += mesh.tex_coords().map_or(0, TexCoords::bytes);
         self.topology = sum(&self.topology, &topology.counts());
         for valence in valences(topology) {
             *self.valences.entry(valence).or_default() += 1;
@@ -203,7 +200,6 @@ impl Inventory {
             (r.plans, "plans"),
             (r.patches_and_trees, "patches and trees"),
             (r.slots, "cache slots"),
-            (r.tex_coords, "texture coordinates"),
         ];
         let parts: Vec<_> = parts.iter().map(|(bytes, name)| format!("{name} {}", Bytes(*bytes as u64))).collect();
         writeln!(f, "resident  {} ({:.0} bytes a face): {}", Bytes(r.total as u64), r.per_face, parts.join(", "))?;
@@ -245,7 +241,7 @@ mod tests {
         assert_eq!(cube.faces_by_sides, BTreeMap::from([(4, 6)]));
         assert_eq!((cube.patches, cube.full.triangles, cube.full.pieces), (6, 6 * 512, 24));
         let r = cube.resident;
-        assert_eq!(r.total, r.topology + r.control_points + r.plans + r.patches_and_trees + r.slots + r.tex_coords);
+        assert_eq!(r.total, r.topology + r.control_points + r.plans + r.patches_and_trees + r.slots);
         let text = cube.to_string();
         assert!(text.contains("faces     6; by sides 4: 6\n") && text.contains("8; by valence 3: 8\n"), "{text}");
         assert!(text.contains("3,072 triangles in 24 grid pieces"), "{text}");

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::grid::MAX_CELLS;
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Bounds, DBounds};
-use crate::mesh::{ControlMesh, TexCoords};
+use crate::mesh::ControlMesh;
 use crate::parallel::{for_each, for_ranges};
 use crate::subdiv::dice::LATTICE_SHIFT;
 use crate::subdiv::{Dicer, PatchRates, Surface};
@@ -65,7 +65,6 @@ pub struct WorldMesh {
     top: TopLevel,
     /// The patch of each leaf of `top`, if some patches are hidden.
     visible: Option<Vec<PatchId>>,
-    tex_coords: Option<TexCoords>,
     world_from_object: DAffine3,
     lattice_from_world: DAffine3,
     /// Takes normals of object space to world space, whatever the transform mirrors.
@@ -179,7 +178,7 @@ impl WorldMesh {
         let surface = Surface::new(&mesh, n_threads)?;
         progress(SHARE_OF_SURFACE);
         // The tree over ten million patches takes a gigabyte to build: polygons and positions are gone before.
-        let tex_coords = mesh.into_tex_coords();
+        drop(mesh);
         let patches: Vec<PatchId> = surface.visible_patches().collect();
         let boxes = patch_boxes(&surface, &patches, n_threads, &|share| {
             progress(SHARE_OF_SURFACE + share * (1.0 - SHARE_OF_SURFACE - SHARE_OF_TREE));
@@ -200,7 +199,6 @@ impl WorldMesh {
         Ok(Self {
             top,
             visible,
-            tex_coords,
             world_from_object,
             lattice_from_world,
             world_from_object_normal: linear.inverse().transpose() * linear.determinant().signum(),
@@ -226,11 +224,6 @@ impl WorldMesh {
     /// The limit surface.
     pub fn surface(&self) -> &Surface {
         &self.surface
-    }
-
-    /// Texture coordinates, if the mesh has them.
-    pub fn tex_coords(&self) -> Option<&TexCoords> {
-        self.tex_coords.as_ref()
     }
 
     pub(super) fn top(&self) -> &TopLevel {
@@ -293,12 +286,11 @@ impl WorldMesh {
         let (corners, vertices) = (mesh.face_vertices.len(), mesh.positions.len());
         let patches: usize = mesh.face_sizes.iter().map(|&n| if n == 4 { 1 } else { n as usize }).sum();
         let mixed = if patches == mesh.n_faces() { 0 } else { 8 * mesh.n_faces() + (corners + patches) / 4 };
-        let tex_coords = mesh.tex_coords.as_ref().map_or(0, TexCoords::bytes);
-        let surface = 8 * corners + 12 * vertices + vertices / 8 + 4 * mesh.n_faces() + mixed + tex_coords;
+        let surface = 8 * corners + 12 * vertices + vertices / 8 + 4 * mesh.n_faces() + mixed;
         let tree = TREE_BYTES_PER_PATCH * patches;
         let boxes = (size_of::<PatchId>() + size_of::<Bounds>() + BUILD_BYTES_PER_PATCH) * patches;
         // First the pairing of half-edges, beside the polygons; then the tree's, without them.
-        let pairing = mesh.bytes() - tex_coords + 4 * (corners + vertices);
+        let pairing = mesh.bytes() + 4 * (corners + vertices);
         let n_slots = tree / BYTES_PER_SLOT;
         BuildBytes {
             tables: n_slots * 8 + n_slots / 8,
@@ -309,9 +301,8 @@ impl WorldMesh {
 
     /// Bytes held, for the whole render.
     pub fn bytes(&self) -> usize {
-        let tex_coords = self.tex_coords.as_ref().map_or(0, TexCoords::bytes);
         let visible = self.visible.as_ref().map_or(0, |v| 4 * v.len());
-        self.surface.bytes() + self.top.bytes() + tex_coords + visible
+        self.surface.bytes() + self.top.bytes() + visible
     }
 
     fn full_tessellation(&self, n_threads: usize) -> FullTessellation {
