@@ -59,7 +59,16 @@ impl HalfEdges for LocalMesh {
     }
 
     fn vertex_tags(&self, h: u32) -> VertexTags {
-        self.tags[self.vertex[h as usize] as usize].clone()
+        self.tags_at(h).clone()
+    }
+
+    fn is_plain(&self, h: u32) -> bool {
+        let tags = self.tags_at(h);
+        tags.is_smooth() && (tags.n_infinite == 0 || tags.n_infinite == 2 && self.is_bounded_by_nothing(h))
+    }
+
+    fn n_infinite(&self, h: u32) -> u32 {
+        self.tags_at(h).n_infinite
     }
 
     fn crease_ends(&self, h: u32) -> Option<[u32; 2]> {
@@ -99,6 +108,12 @@ impl LocalMesh {
         &self.tags[self.vertex[h as usize] as usize]
     }
 
+    /// Whether the sector of a corner with two infinitely sharp edges ends where there is no other side.
+    fn is_bounded_by_nothing(&self, h: u32) -> bool {
+        let faces = fan_size(self, h, |e| self.twin(e) == NONE);
+        self.crease_ends(h).is_none() && faces == self.fan_size(h) && !faces.1
+    }
+
     /// Number of faces in the [`fan`](Self::fan) of a corner, and whether it is closed.
     pub fn fan_size(&self, h: u32) -> (usize, bool) {
         let cut = self.tags_at(h).n_infinite >= 2;
@@ -125,6 +140,9 @@ impl LocalMesh {
     /// Everything that decides the plan, as words to hash and compare, in place of what was in `key`.
     pub fn key(&self, key: &mut Vec<u32>) {
         key.clear();
+        if (0..self.n_corners()).all(|h| self.is_plain(h)) {
+            return self.plain_key(key);
+        }
         key.push(self.n_faces() as u32);
         key.extend_from_slice(&self.face_start);
         key.extend_from_slice(&self.vertex);
@@ -139,6 +157,26 @@ impl LocalMesh {
                 key.extend(tags.semi_sharp.iter().map(|s| s.to_bits()));
             }
         }
+    }
+}
+
+/// Marks keys of rings whose corners are all plain.
+const PLAIN: u32 = 1 << 31;
+
+/// Marks those of quads among them.
+const ALL_QUADS: u32 = 1 << 30;
+
+impl LocalMesh {
+    /// As [`key`](Self::key), where all corners of the target are plain: edges at them are sound, so that their twins follow
+    /// from the vertices, no others count, and nothing is sharp.
+    fn plain_key(&self, key: &mut Vec<u32>) {
+        if self.all_quads() {
+            key.push(self.n_faces() as u32 | PLAIN | ALL_QUADS);
+        } else {
+            key.push(self.n_faces() as u32 | PLAIN);
+            key.extend_from_slice(&self.face_start);
+        }
+        key.extend_from_slice(&self.vertex);
     }
 }
 
@@ -167,13 +205,12 @@ pub fn extract_whole<M: HalfEdges + ?Sized>(
     let mut walker = RingWalker::default();
     walker.clear();
     walker.add_face(mesh, first);
-    let (start, n_corners) = mesh.face_corners(mesh.face(first));
+    let (start, n_corners) = mesh.corners_at(first);
     let corners: Vec<u32> = (0..n_corners).map(|k| start + (first - start + k) % n_corners).collect();
-    let touching = corners.iter().flat_map(|&h| spokes(mesh.vertex(h))).map(|spoke| mesh.face(spoke));
-    touching.for_each(|face| walker.add_face(mesh, mesh.face_corners(face).0));
-    let corner_tags: Vec<VertexTags> = corners.iter().map(|&h| mesh.vertex_tags(h)).collect();
-    walker.add_vertices(mesh, n_corners);
-    walker.write(mesh, &corner_tags, outer_tags);
+    let touching = corners.iter().flat_map(|&h| spokes(mesh.vertex(h))).map(|spoke| mesh.corners_at(spoke).0);
+    touching.for_each(|start| walker.add_face(mesh, start));
+    walker.add_vertices::<M, true>(mesh, n_corners);
+    walker.write(mesh, n_corners, outer_tags);
     walker.ring
 }
 
@@ -297,19 +334,27 @@ fn least_turn(signs: &[CornerSign]) -> u32 {
     (1..4).fold(0, |best, t| if turned(t) < turned(best) { t } else { best }) as u32
 }
 
+/// A face seen by what lies around its corners.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// From which corner on its ring is the same however the face is turned. Rings that may be regular, and those of polygons,
+    /// are not turned.
+    pub turn: u32,
+    /// Whether all corners are plain, as [`HalfEdges::is_plain`] has it.
+    pub is_plain: bool,
+    /// Whether the ring is 3 x 3 quads without any tag.
+    pub is_regular: bool,
+}
+
 /// Finds rings, one after the other, in memory that it keeps.
 #[derive(Debug, Default)]
 pub struct RingWalker {
-    /// The source's faces and vertices.
+    /// The source's faces, by their first half-edges, and vertices.
     faces: Numbering,
     vertices: Numbering,
     /// Half-edges of the source, in the ring's order.
     half_edges: Vec<u32>,
-    /// Tags of the target's corners, and what tells the corners apart.
-    corner_tags: Vec<VertexTags>,
     corner_signs: Vec<CornerSign>,
-    /// Whether something at a corner is known not to be regular.
-    is_irregular: bool,
     ring: Extracted,
 }
 
@@ -317,40 +362,61 @@ impl RingWalker {
     /// The sources that [`extract`] gives for the face of `first`, without the ring: what loading a patch needs, again and
     /// again.
     pub fn sources<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32) -> &[u32] {
-        let n_corners = self.walk::<M, false>(mesh, first);
-        self.add_vertices(mesh, n_corners);
+        let n_corners = self.walk(mesh, first);
+        self.add_vertices::<M, false>(mesh, n_corners);
         &self.vertices.values
     }
 
     /// As [`extract`].
     pub fn extract<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32, outer_tags: bool) -> &Extracted {
-        let n_corners = self.walk::<M, false>(mesh, first);
-        self.finish(mesh, n_corners, outer_tags)
+        let n_corners = self.walk(mesh, first);
+        self.add_vertices::<M, true>(mesh, n_corners);
+        self.write(mesh, n_corners, outer_tags);
+        &self.ring
     }
 
-    /// As [`extract`], but from one of the face's corners that is the same however the face is turned: the one that is that
-    /// many corners after `first`. Rings that may be regular, and those of polygons, are not turned.
-    pub fn extract_turned<M: HalfEdges + ?Sized>(
+    /// The key and the sources of the ring from `first` on, whose corners are as `look` says. If they are not plain, all of
+    /// the ring is extracted on the way.
+    pub fn key<M: HalfEdges + ?Sized>(
         &mut self,
         mesh: &M,
         first: u32,
+        look: Look,
         outer_tags: bool,
-    ) -> (u32, &Extracted) {
-        let n_corners = self.walk::<M, true>(mesh, first);
-        let turn = if self.is_irregular && n_corners == 4 { least_turn(&self.corner_signs) } else { 0 };
-        if turn != 0 {
-            let (start, _) = mesh.face_corners(mesh.face(first));
-            self.walk::<M, false>(mesh, start + (first - start + turn) % 4);
+        key: &mut Vec<u32>,
+    ) -> &[u32] {
+        let n_corners = self.walk(mesh, first);
+        self.add_vertices::<M, true>(mesh, n_corners);
+        if look.is_plain {
+            key.clear();
+            self.ring.mesh.plain_key(key);
+        } else {
+            self.write(mesh, n_corners, outer_tags);
+            self.ring.mesh.key(key);
         }
-        (turn, self.finish(mesh, n_corners, outer_tags))
+        &self.vertices.values
     }
 
-    fn finish<M: HalfEdges + ?Sized>(&mut self, mesh: &M, n_corners: u32, outer_tags: bool) -> &Extracted {
-        self.add_vertices(mesh, n_corners);
-        let corner_tags = std::mem::take(&mut self.corner_tags);
-        self.write(mesh, &corner_tags, outer_tags);
-        self.corner_tags = corner_tags;
-        &self.ring
+    /// Looks at the corners of the face of `first`, without finding its ring.
+    pub fn look<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32) -> Look {
+        let (start, n_corners) = mesh.corners_at(first);
+        self.corner_signs.clear();
+        let (mut is_plain, mut is_irregular, mut is_regular) = (true, false, n_corners == 4);
+        for k in first - start..first - start + n_corners {
+            let h = start + if k < n_corners { k } else { k - n_corners };
+            let mut sign = CornerSign::default();
+            if mesh.is_plain(h) {
+                let is_closed = sign_fan(mesh, h, false, |_| 0.0, &mut sign);
+                is_irregular |= sign.is_irregular(is_closed);
+                is_regular &= is_closed && sign.n_faces == 3 && !sign.has_polygon;
+            } else {
+                (is_plain, is_regular) = (false, false);
+                is_irregular |= sign_tagged(mesh, h, &mut sign);
+            }
+            self.corner_signs.push(sign);
+        }
+        let turn = if is_irregular && n_corners == 4 { least_turn(&self.corner_signs) } else { 0 };
+        Look { turn, is_plain, is_regular }
     }
 
     /// Hands over the ring that was extracted last.
@@ -358,16 +424,19 @@ impl RingWalker {
         std::mem::take(&mut self.ring)
     }
 
-    /// Finds the faces and the tags of corners, and what tells corners apart if they are to be `SIGNED`. Returns the number
-    /// of corners.
-    fn walk<M: HalfEdges + ?Sized, const SIGNED: bool>(&mut self, mesh: &M, first: u32) -> u32 {
+    /// Finds the faces. Returns the number of corners.
+    fn walk<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32) -> u32 {
         self.clear();
         self.add_face(mesh, first);
-        let (start, n_corners) = mesh.face_corners(mesh.face(first));
-        for k in 0..n_corners {
-            let turned = first + k;
-            let h = if turned < start + n_corners { turned } else { turned - n_corners };
-            self.add_corner::<M, SIGNED>(mesh, h);
+        let (start, n_corners) = mesh.corners_at(first);
+        for k in first - start..first - start + n_corners {
+            let h = start + if k < n_corners { k } else { k - n_corners };
+            if mesh.is_plain(h) {
+                self.add_fan(mesh, h, |e| mesh.twin(e) == NONE);
+            } else {
+                let cut = mesh.n_infinite(h) >= 2;
+                self.add_fan(mesh, h, |e| is_border(mesh, e, cut));
+            }
         }
         n_corners
     }
@@ -375,9 +444,6 @@ impl RingWalker {
     fn clear(&mut self) {
         self.faces.clear();
         self.vertices.clear();
-        self.corner_tags.clear();
-        self.corner_signs.clear();
-        self.is_irregular = false;
         let ring = &mut self.ring;
         ring.starts.clear();
         self.half_edges.clear();
@@ -389,101 +455,74 @@ impl RingWalker {
 
     #[inline(always)]
     fn add_face<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32) {
-        if self.faces.number(mesh.face(h)).1 {
+        if self.faces.number(mesh.corners_at(h).0).1 {
             self.ring.starts.push(h);
         }
     }
 
     /// Adds the faces around a corner of the target, counter-clockwise, then what lies clockwise of it: an order that only
     /// topology decides.
-    fn add_corner<M: HalfEdges + ?Sized, const SIGNED: bool>(&mut self, mesh: &M, h: u32) {
-        let mut sign = CornerSign::default();
-        if mesh.is_plain(h) {
-            let is_closed = self.add_fan::<M, SIGNED>(mesh, h, false, &mut sign);
-            self.corner_tags.push(VertexTags { n_infinite: if is_closed { 0 } else { 2 }, ..Default::default() });
-            self.is_irregular |= sign.is_irregular(is_closed);
-        } else {
-            let tags = mesh.vertex_tags(h);
-            let is_closed = self.add_fan::<M, SIGNED>(mesh, h, tags.n_infinite >= 2, &mut sign);
-            let is_plain = tags == VertexTags { n_infinite: if is_closed { 0 } else { 2 }, ..Default::default() };
-            if SIGNED && !is_plain {
-                sign.add_tags(&tags);
-            }
-            let is_semi_sharp = !tags.semi_sharp.is_empty() || (tags.sharpness > 0.0 && tags.sharpness.is_finite());
-            self.is_irregular |= sign.is_irregular(is_closed) || is_semi_sharp;
-            self.corner_tags.push(tags);
-        }
-        self.corner_signs.push(sign);
-    }
-
-    /// Returns whether the faces close around the corner.
     #[inline(always)]
-    fn add_fan<M: HalfEdges + ?Sized, const SIGNED: bool>(
-        &mut self,
-        mesh: &M,
-        h: u32,
-        cut: bool,
-        sign: &mut CornerSign,
-    ) -> bool {
-        let is_plain = mesh.is_plain(h);
-        let sharpness = |e: u32| if is_plain { 0.0 } else { mesh.edge_sharpness(e) };
+    fn add_fan<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32, is_border: impl Fn(u32) -> bool) {
         let mut spoke = h;
         loop {
             let arriving = mesh.prev(spoke);
-            if is_border(mesh, arriving, cut) {
+            if is_border(arriving) {
                 break;
             }
             spoke = mesh.twin(arriving);
             if spoke == h {
-                return true;
+                return;
             }
             self.add_face(mesh, spoke);
-            if SIGNED {
-                sign.add_face(mesh.face_corners(mesh.face(spoke)).1, false, sharpness(arriving));
-            }
         }
         spoke = h;
-        while !is_border(mesh, spoke, cut) {
-            let crossed = spoke;
+        while !is_border(spoke) {
             spoke = mesh.next(mesh.twin(spoke));
             self.add_face(mesh, spoke);
-            if SIGNED {
-                sign.add_face(mesh.face_corners(mesh.face(spoke)).1, true, sharpness(crossed));
-            }
         }
-        false
     }
 
-    /// Adds the vertices of all faces, then the ends of fins at corners.
-    fn add_vertices<M: HalfEdges + ?Sized>(&mut self, mesh: &M, n_corners: u32) {
+    /// Adds the vertices of all faces, then the ends of fins at corners. Unless `LISTED`, that is all; else the vertex and
+    /// the face of each half-edge are written down.
+    fn add_vertices<M: HalfEdges + ?Sized, const LISTED: bool>(&mut self, mesh: &M, n_corners: u32) {
         let ring = &mut self.ring.mesh;
-        ring.face_start.push(0);
-        for (place, (&start, &face)) in self.ring.starts.iter().zip(&self.faces.values).enumerate() {
-            let (first, n) = mesh.face_corners(face);
-            for h in (start..first + n).chain(first..start) {
-                ring.vertex.push(self.vertices.number(mesh.vertex(h)).0);
-                ring.face.push(place as u32);
-                self.half_edges.push(h);
-            }
-            ring.face_start.push(self.half_edges.len() as u32);
+        if LISTED {
+            ring.face_start.push(0);
         }
-        for (k, &corner) in self.half_edges[..n_corners as usize].iter().enumerate() {
-            if let Some(ends) = mesh.crease_ends(corner) {
-                ring.fins.push((ring.vertex[k], ends.map(|v| self.vertices.number(v).0)));
+        for (place, (&start, &first)) in self.ring.starts.iter().zip(&self.faces.values).enumerate() {
+            let (_, n) = mesh.corners_at(first);
+            for h in (start..first + n).chain(first..start) {
+                let (number, _) = self.vertices.number(mesh.vertex(h));
+                if LISTED {
+                    ring.vertex.push(number);
+                    ring.face.push(place as u32);
+                    self.half_edges.push(h);
+                }
+            }
+            if LISTED {
+                ring.face_start.push(self.half_edges.len() as u32);
+            }
+        }
+        let (start, first) = (self.ring.starts[0], self.faces.values[0]);
+        for h in (start..first + n_corners).chain(first..start).filter(|&h| !mesh.is_plain(h)) {
+            if let Some(ends) = mesh.crease_ends(h) {
+                let v = self.vertices.number(mesh.vertex(h)).0;
+                ring.fins.push((v, ends.map(|v| self.vertices.number(v).0)));
             }
         }
     }
 
     /// Writes down what else the ring has: twins, tags and sharpness.
-    fn write<M: HalfEdges + ?Sized>(&mut self, mesh: &M, corner_tags: &[VertexTags], outer_tags: bool) {
+    fn write<M: HalfEdges + ?Sized>(&mut self, mesh: &M, n_corners: u32, outer_tags: bool) {
         self.ring.sources.clear();
         self.ring.sources.extend_from_slice(&self.vertices.values);
         let mut twin = std::mem::take(&mut self.ring.mesh.twin);
         twin.clear();
         twin.extend(self.half_edges.iter().map(|&h| self.local(mesh, mesh.twin(h))));
         self.ring.mesh.twin = twin;
-        self.set_tags(mesh, corner_tags, outer_tags);
-        self.set_sharpness(mesh, corner_tags);
+        self.set_tags(mesh, n_corners, outer_tags);
+        self.set_sharpness(mesh, n_corners);
     }
 
     /// The local number of a half-edge of the source, or [`NONE`].
@@ -492,12 +531,12 @@ impl RingWalker {
         if h == NONE {
             return NONE;
         }
-        let Some(place) = self.faces.find(mesh.face(h)) else { return NONE };
+        let Some(place) = self.faces.find(mesh.corners_at(h).0) else { return NONE };
         let (start, next) = (self.ring.starts[place as usize], &self.ring.mesh.face_start[place as usize..]);
         if h >= start { next[0] + h - start } else { next[1] - (start - h) }
     }
 
-    fn set_tags<M: HalfEdges + ?Sized>(&mut self, mesh: &M, corner_tags: &[VertexTags], outer: bool) {
+    fn set_tags<M: HalfEdges + ?Sized>(&mut self, mesh: &M, n_corners: u32, outer: bool) {
         let ring = &mut self.ring.mesh;
         ring.tags.clear();
         ring.tags.resize(self.vertices.values.len(), VertexTags::default());
@@ -506,31 +545,74 @@ impl RingWalker {
                 ring.tags[v as usize].semi_sharp = mesh.vertex_tags(h).semi_sharp;
             }
         }
-        for (&v, tags) in ring.vertex.iter().zip(corner_tags) {
-            ring.tags[v as usize].clone_from(tags);
+        for (&v, &h) in ring.vertex.iter().zip(&self.half_edges[..n_corners as usize]) {
+            ring.tags[v as usize] = mesh.vertex_tags(h);
         }
     }
 
-    fn set_sharpness<M: HalfEdges + ?Sized>(&mut self, mesh: &M, corner_tags: &[VertexTags]) {
+    fn set_sharpness<M: HalfEdges + ?Sized>(&mut self, mesh: &M, n_corners: u32) {
         let ring = &mut self.ring.mesh;
         ring.sharpness.clear();
         ring.sharpness.resize(self.half_edges.len(), 0.0);
-        if corner_tags.iter().all(|tags| *tags == VertexTags::default()) {
+        let corners = &ring.vertex[..n_corners as usize];
+        if corners.iter().all(|&v| ring.tags[v as usize] == VertexTags::default()) {
             return;
         }
         // The target's vertices come first.
-        let n_corners = ring.vertex[..corner_tags.len()].iter().fold(0, |n, &v| n.max(v + 1));
+        let n_vertices = corners.iter().fold(0, |n, &v| n.max(v + 1));
         for bounds in ring.face_start.windows(2) {
             let (start, end) = (bounds[0] as usize, bounds[1] as usize);
             for i in start..end {
                 let next = if i + 1 == end { start } else { i + 1 };
-                let is_known = ring.vertex[i].min(ring.vertex[next]) < n_corners;
+                let is_known = ring.vertex[i].min(ring.vertex[next]) < n_vertices;
                 if is_known && ring.twin[i] != NONE {
                     ring.sharpness[i] = mesh.edge_sharpness(self.half_edges[i]);
                 }
             }
         }
     }
+}
+
+/// What the faces around a corner add to its sign, up to borders, in the order in which [`RingWalker`] adds them; returns
+/// whether they close around it. `sharpness` is that of an edge between two of them.
+#[inline(always)]
+fn sign_fan<M: HalfEdges + ?Sized>(
+    mesh: &M,
+    h: u32,
+    cut: bool,
+    sharpness: impl Fn(u32) -> f32,
+    sign: &mut CornerSign,
+) -> bool {
+    let mut spoke = h;
+    loop {
+        let arriving = mesh.prev(spoke);
+        if is_border(mesh, arriving, cut) {
+            break;
+        }
+        spoke = mesh.twin(arriving);
+        if spoke == h {
+            return true;
+        }
+        sign.add_face(mesh.corners_at(spoke).1, false, sharpness(arriving));
+    }
+    spoke = h;
+    while !is_border(mesh, spoke, cut) {
+        let crossed = spoke;
+        spoke = mesh.next(mesh.twin(spoke));
+        sign.add_face(mesh.corners_at(spoke).1, true, sharpness(crossed));
+    }
+    false
+}
+
+/// The sign of a corner that is not known to be plain; returns whether it is known not to be regular.
+fn sign_tagged<M: HalfEdges + ?Sized>(mesh: &M, h: u32, sign: &mut CornerSign) -> bool {
+    let tags = mesh.vertex_tags(h);
+    let is_closed = sign_fan(mesh, h, tags.n_infinite >= 2, |e| mesh.edge_sharpness(e), sign);
+    if tags != (VertexTags { n_infinite: if is_closed { 0 } else { 2 }, ..Default::default() }) {
+        sign.add_tags(&tags);
+    }
+    let is_semi_sharp = !tags.semi_sharp.is_empty() || (tags.sharpness > 0.0 && tags.sharpness.is_finite());
+    sign.is_irregular(is_closed) || is_semi_sharp
 }
 
 #[cfg(test)]
@@ -548,12 +630,14 @@ mod tests {
             let topology = Topology::new(&mesh, 1);
             for face in 0..topology.n_faces() as u32 {
                 let first = topology.face_corners(face).0;
-                let (turn, turned) = walker.extract_turned(&topology, first, false);
-                let turned = turned.sources.clone();
-                assert_eq!(extract(&topology, first + turn, false).sources, turned);
+                let look = walker.look(&topology, first);
                 for outer_tags in [false, true] {
-                    let extracted = extract(&topology, first, outer_tags).sources;
-                    assert_eq!(walker.sources(&topology, first), extracted);
+                    let ring = extract(&topology, first + look.turn, outer_tags);
+                    assert_eq!(walker.sources(&topology, first + look.turn), ring.sources);
+                    let (mut key, mut of_ring) = (Vec::new(), Vec::new());
+                    walker.key(&topology, first + look.turn, look, outer_tags, &mut key);
+                    ring.mesh.key(&mut of_ring);
+                    assert_eq!(key, of_ring);
                 }
             }
         }

@@ -315,7 +315,8 @@ impl PlanLibrary {
             .collect();
         let n_limits = if n == 4 { 4 } else { 0 };
         let limits: Vec<Limit> = (0..n_limits).map(|k| self.limit(id, ring, rows, &children[k as usize], k)).collect();
-        let semi_sharp = ring.tags.iter().any(|t| !t.semi_sharp.is_empty());
+        // Those of other vertices count only for edges to such corners.
+        let semi_sharp = (0..n).any(|k| !ring.tags_at(k).semi_sharp.is_empty());
         let node = &mut self.nodes[id.index()];
         node.rows = rows;
         node.in_hull = !(self.rules.crease_method == CreaseMethod::Chaikin && semi_sharp);
@@ -375,10 +376,16 @@ impl PlanLibrary {
         }
         let (mut walker, mut key) = (std::mem::take(&mut self.walker), Vec::new());
         let quarters = (0..n).map(|k| {
-            let (turn, child) = walker.extract_turned(&refined, child_start(n, k), self.outer_tags());
-            let points = child.sources.iter().map(|&v| rows.place_of(&refined, v)).collect();
-            child.mesh.key(&mut key);
-            Quarter { node: self.find(&key).ok_or_else(|| walker.take().mesh), turn, points }
+            let start = child_start(n, k);
+            let look = walker.look(&refined, start);
+            let turned = start & !3 | (start + look.turn) & 3;
+            let sources = walker.key(&refined, turned, look, self.outer_tags(), &mut key);
+            let points = sources.iter().map(|&v| rows.place_of(&refined, v)).collect();
+            let node = self.find(&key).ok_or_else(|| {
+                walker.extract(&refined, turned, self.outer_tags());
+                walker.take().mesh
+            });
+            Quarter { node, turn: look.turn, points }
         });
         let quarters = quarters.collect();
         self.walker = walker;

@@ -20,6 +20,8 @@ const MOST_CORNERS: u32 = 16 - PLACE_BITS;
 pub(super) fn route(ring: &LocalMesh) -> Vec<u32> {
     let mut out = Vec::with_capacity(2 * ring.n_faces());
     let mut n_vertices = 0;
+    // The target's vertices come first.
+    let n_of_target = (0..ring.n_corners()).fold(0, |n, k| n.max(ring.vertex(k) + 1));
     for face in 0..ring.n_faces() as u32 {
         let (first, n) = ring.face_corners(face);
         if n > MOST_CORNERS {
@@ -36,7 +38,10 @@ pub(super) fn route(ring: &LocalMesh) -> Vec<u32> {
             out.push(new);
             continue;
         }
-        let Some(h) = (first..first + n).find(|&h| ring.twin(h) < first) else { return Vec::new() };
+        // Other twins than those of edges at corners need not be the same in all rings of a plan.
+        let is_at_corner = |h: u32| ring.vertex(h).min(ring.vertex(ring.next(h))) < n_of_target;
+        let across = (first..first + n).find(|&h| is_at_corner(h) && ring.twin(h) < first);
+        let Some(h) = across else { return Vec::new() };
         out.extend([ring.twin(h), new << PLACE_BITS | (h - first)]);
     }
     // The ends of fins are on no face.

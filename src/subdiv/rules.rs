@@ -495,6 +495,21 @@ impl HalfEdges for RefinedView<'_> {
         (4 * face, 4)
     }
 
+    #[inline]
+    fn corners_at(&self, h: u32) -> (u32, u32) {
+        (h & !3, 4)
+    }
+
+    #[inline]
+    fn next(&self, h: u32) -> u32 {
+        h & !3 | (h + 1) & 3
+    }
+
+    #[inline]
+    fn prev(&self, h: u32) -> u32 {
+        h & !3 | h.wrapping_sub(1) & 3
+    }
+
     fn edge_sharpness(&self, h: u32) -> f32 {
         if self.twin(h) == NONE {
             return f32::INFINITY;
@@ -513,9 +528,28 @@ impl HalfEdges for RefinedView<'_> {
     fn is_plain(&self, h: u32) -> bool {
         match self.origin[self.vertex(h) as usize] {
             Origin::Face(_) => true,
-            Origin::Edge(e) => self.ring.twin(e) == NONE || self.ring.edge_sharpness(e) == 0.0,
-            Origin::Vertex(e) => *self.ring.tags_at(e) == VertexTags::default(),
+            Origin::Edge(e) => {
+                let is_smooth = |s: f32| s == 0.0 || (s.is_finite() && halves(&self.rules, self.ring, e) == [0.0; 2]);
+                self.ring.twin(e) == NONE || is_smooth(self.ring.edge_sharpness(e))
+            }
+            Origin::Vertex(e) => {
+                let tags = self.ring.tags_at(e);
+                if tags.is_smooth() {
+                    self.ring.is_plain(e)
+                } else {
+                    let after = decay_tags(self.rules.crease_method, tags);
+                    after.is_smooth() && after.n_infinite == 0
+                }
+            }
             Origin::Middle(_) | Origin::Nothing => false,
+        }
+    }
+
+    fn n_infinite(&self, h: u32) -> u32 {
+        match self.origin[self.vertex(h) as usize] {
+            Origin::Vertex(e) => self.ring.tags_at(e).n_infinite,
+            Origin::Edge(e) if self.ring.edge_sharpness(e) == f32::INFINITY => 2,
+            _ => 0,
         }
     }
 

@@ -276,7 +276,7 @@ impl Surface {
         let (first, size) = self.topology.face_corners(face.0);
         points.node = self.plan_of_face[face.idx()];
         if points.node == REGULAR {
-            for (point, vertex) in points.control.iter_mut().zip(known_regular_ring(&self.topology, first)) {
+            for (point, vertex) in points.control.iter_mut().zip(regular_ring(&self.topology, first)) {
                 *point = self.control_point(vertex);
             }
             return;
@@ -408,8 +408,8 @@ fn patch_of(faces_of_patches: Option<&FaceIndex>, face: FaceId, sub: u32) -> Pat
 /// Where in a regular ring the vertices at corner `k` go: itself, then across its edge and on counter-clockwise.
 const CORNER_PLACES: [[u8; 4]; 4] = [[5, 1, 2, 0], [6, 7, 11, 3], [10, 14, 13, 15], [9, 8, 4, 12]];
 
-/// [`regular_ring`] of a face that has one.
-fn known_regular_ring(topology: &Topology, first: u32) -> [u32; 16] {
+/// The 16 vertices around an untagged quad with regular corners, u fastest.
+fn regular_ring(topology: &Topology, first: u32) -> [u32; 16] {
     let mut out = [0; 16];
     for (h, places) in (first..).zip(CORNER_PLACES) {
         // All faces are quads, so that their half-edges are found by their first ones.
@@ -429,52 +429,6 @@ fn known_regular_ring(topology: &Topology, first: u32) -> [u32; 16] {
         }
     }
     out
-}
-
-/// The 16 vertices around an untagged quad with regular corners, u fastest, by plain hops; `None` for other faces.
-fn regular_ring(topology: &Topology, first: u32) -> Option<[u32; 16]> {
-    if topology.face_corners(topology.face(first)).1 != 4 {
-        return None;
-    }
-    let mut out = [0; 16];
-    for k in 0..4u32 {
-        let h = first + k;
-        let v = topology.vertex(h);
-        let across = topology.twin(h);
-        if across == NONE || topology.is_tagged(v) || !is_quad(topology, across) {
-            return None;
-        }
-        let diagonal = topology.twin(topology.next(across));
-        let is_valence_two = diagonal == topology.prev(h);
-        if diagonal == NONE || is_valence_two || !is_quad(topology, diagonal) {
-            return None;
-        }
-        // Valence 4: going on around the corner arrives in the face across the previous edge.
-        let beyond = topology.twin(topology.next(diagonal));
-        let before = topology.twin(topology.prev(h));
-        if beyond == NONE || before == NONE || topology.next(beyond) != before {
-            return None;
-        }
-        let left = topology.next(topology.next(across));
-        let mut set = |x: i32, y: i32, vertex: u32| {
-            let (i, j) = match k {
-                0 => (1 + x, 1 + y),
-                1 => (2 - y, 1 + x),
-                2 => (2 - x, 2 - y),
-                _ => (1 + y, 2 - x),
-            };
-            out[(4 * j + i) as usize] = vertex;
-        };
-        set(0, 0, v);
-        set(0, -1, topology.vertex(left));
-        set(1, -1, topology.vertex(topology.next(left)));
-        set(-1, -1, topology.vertex(topology.prev(diagonal)));
-    }
-    Some(out)
-}
-
-fn is_quad(topology: &Topology, h: u32) -> bool {
-    topology.face_corners(topology.face(h)).1 == 4
 }
 
 /// Faces a thread plans before it asks for more.
@@ -518,15 +472,19 @@ fn plan_face(
     walker: &mut RingWalker,
     key: &mut Vec<u32>,
 ) -> NodeId {
+    if topology.is_hidden(face) {
+        return REGULAR;
+    }
     let (first, _) = topology.face_corners(face.0);
-    if topology.is_hidden(face) || regular_ring(topology, first).is_some() {
+    let look = walker.look(topology, first);
+    if look.is_regular {
         return REGULAR;
     }
     let outer_tags = library.read().outer_tags();
-    let (turn, ring) = walker.extract_turned(topology, first, outer_tags);
-    ring.mesh.key(key);
+    walker.key(topology, first + look.turn, look, outer_tags, key);
     let known = library.read().find(key);
-    known.unwrap_or_else(|| library.write().node(&ring.mesh)).turned(turn)
+    let make = || library.write().node(&walker.extract(topology, first + look.turn, outer_tags).mesh);
+    known.unwrap_or_else(make).turned(look.turn)
 }
 
 #[cfg(test)]
@@ -535,15 +493,63 @@ mod tests {
     use crate::mesh::random::random_mesh;
     use crate::mesh::shapes;
 
+    /// As [`regular_ring`], checked on the way: the 16 vertices around an untagged quad with regular corners, u fastest, by plain hops; `None` for other faces.
+    fn slow_regular_ring(topology: &Topology, first: u32) -> Option<[u32; 16]> {
+        if topology.corners_at(first).1 != 4 {
+            return None;
+        }
+        let mut out = [0; 16];
+        for k in 0..4u32 {
+            let h = first + k;
+            let v = topology.vertex(h);
+            let across = topology.twin(h);
+            if across == NONE || topology.is_tagged(v) || !is_quad(topology, across) {
+                return None;
+            }
+            let diagonal = topology.twin(topology.next(across));
+            let is_valence_two = diagonal == topology.prev(h);
+            if diagonal == NONE || is_valence_two || !is_quad(topology, diagonal) {
+                return None;
+            }
+            // Valence 4: going on around the corner arrives in the face across the previous edge.
+            let beyond = topology.twin(topology.next(diagonal));
+            let before = topology.twin(topology.prev(h));
+            if beyond == NONE || before == NONE || topology.next(beyond) != before {
+                return None;
+            }
+            let left = topology.next(topology.next(across));
+            let mut set = |x: i32, y: i32, vertex: u32| {
+                let (i, j) = match k {
+                    0 => (1 + x, 1 + y),
+                    1 => (2 - y, 1 + x),
+                    2 => (2 - x, 2 - y),
+                    _ => (1 + y, 2 - x),
+                };
+                out[(4 * j + i) as usize] = vertex;
+            };
+            set(0, 0, v);
+            set(0, -1, topology.vertex(left));
+            set(1, -1, topology.vertex(topology.next(left)));
+            set(-1, -1, topology.vertex(topology.prev(diagonal)));
+        }
+        Some(out)
+    }
+
+    fn is_quad(topology: &Topology, h: u32) -> bool {
+        topology.corners_at(h).1 == 4
+    }
+
     #[test]
-    fn known_regular_rings_are_regular_rings() {
-        let mut n_regular = 0;
+    fn regular_rings_are_those_of_faces_that_look_so() {
+        let (mut n_regular, mut walker) = (0, RingWalker::default());
         for mesh in shapes::all().into_iter().map(|(_, mesh)| mesh).chain((0..100).map(random_mesh)) {
             let topology = Topology::new(&mesh, 1);
             for face in 0..topology.n_faces() as u32 {
                 let first = topology.face_corners(face).0;
-                if let Some(ring) = regular_ring(&topology, first) {
-                    assert_eq!(known_regular_ring(&topology, first), ring);
+                let ring = slow_regular_ring(&topology, first);
+                assert_eq!(walker.look(&topology, first).is_regular, ring.is_some());
+                if let Some(ring) = ring {
+                    assert_eq!(regular_ring(&topology, first), ring);
                     n_regular += 1;
                 }
             }

@@ -502,6 +502,16 @@ impl HalfEdges for Topology {
     }
 
     #[inline]
+    fn next(&self, h: u32) -> u32 {
+        self.faces.next(h)
+    }
+
+    #[inline]
+    fn prev(&self, h: u32) -> u32 {
+        self.faces.prev(h)
+    }
+
+    #[inline]
     fn edge_sharpness(&self, h: u32) -> f32 {
         let twin = self.twin[h as usize];
         if twin == NONE {
@@ -523,6 +533,33 @@ impl HalfEdges for Topology {
     #[inline]
     fn is_plain(&self, h: u32) -> bool {
         !self.is_tagged(self.vertex[h as usize].0)
+    }
+
+    fn n_infinite(&self, h: u32) -> u32 {
+        if let Some(tags) = self.nonmanifold_tags.get(&self.vertex[h as usize].0) {
+            return tags.n_infinite;
+        }
+        let mut n = 0;
+        let mut count = |e: u32| n += u32::from(HalfEdges::edge_sharpness(self, e) == f32::INFINITY);
+        let mut spoke = h;
+        loop {
+            count(spoke);
+            let arriving = self.faces.prev(spoke);
+            spoke = self.twin[arriving as usize];
+            if spoke == h {
+                return n;
+            }
+            if spoke == NONE {
+                count(arriving);
+                break;
+            }
+        }
+        spoke = h;
+        while self.twin[spoke as usize] != NONE {
+            spoke = self.faces.next(self.twin[spoke as usize]);
+            count(spoke);
+        }
+        n
     }
 
     fn crease_ends(&self, h: u32) -> Option<[u32; 2]> {

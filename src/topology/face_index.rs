@@ -13,7 +13,7 @@ pub enum FaceIndex {
     Mixed {
         /// First half-edge of each face, and the total at the end.
         start: Vec<u32>,
-        /// A bit per half-edge, set where a face starts, and at the end.
+        /// A bit per half-edge, set where a face starts, and one more at the end.
         is_start: Vec<u64>,
         /// Number of set bits before each word of `is_start`.
         rank: Vec<u32>,
@@ -38,12 +38,10 @@ impl FaceIndex {
             total += n;
         }
         let mut is_start = vec![0u64; total as usize / 64 + 1];
+        start.push(total);
         for &s in &start {
             is_start[s as usize / 64] |= 1 << (s % 64);
         }
-        // One more, for the last face's end.
-        is_start[total as usize / 64] |= 1 << (total % 64);
-        start.push(total);
         let mut before = 0;
         let rank = is_start
             .iter()
@@ -83,6 +81,67 @@ impl FaceIndex {
         }
     }
 
+    /// The half-edge that is first of those of the face of `h`.
+    #[inline(always)]
+    fn first(is_start: &[u64], h: u32) -> u32 {
+        let mut word = h as usize / 64;
+        let mut starts = is_start[word] & (u64::MAX >> (63 - h % 64));
+        while starts == 0 {
+            word -= 1;
+            starts = is_start[word];
+        }
+        64 * word as u32 + 63 - starts.leading_zeros()
+    }
+
+    /// Where the first face starts that does not start before `h`.
+    #[inline(always)]
+    fn start_from(is_start: &[u64], h: u32) -> u32 {
+        let mut word = h as usize / 64;
+        let mut starts = is_start[word] & (u64::MAX << (h % 64));
+        while starts == 0 {
+            word += 1;
+            starts = is_start[word];
+        }
+        64 * word as u32 + starts.trailing_zeros()
+    }
+
+    #[inline(always)]
+    fn starts(is_start: &[u64], h: u32) -> bool {
+        (is_start[h as usize / 64] >> (h % 64)) & 1 == 1
+    }
+
+    /// The half-edge after `h` in its face.
+    #[inline(always)]
+    pub fn next(&self, h: u32) -> u32 {
+        match self {
+            FaceIndex::Quads { .. } => h & !3 | (h + 1) & 3,
+            FaceIndex::Mixed { is_start, .. } if Self::starts(is_start, h + 1) => Self::first(is_start, h),
+            FaceIndex::Mixed { .. } => h + 1,
+        }
+    }
+
+    /// The half-edge before `h` in its face.
+    #[inline(always)]
+    pub fn prev(&self, h: u32) -> u32 {
+        match self {
+            FaceIndex::Quads { .. } => h & !3 | h.wrapping_sub(1) & 3,
+            FaceIndex::Mixed { is_start, .. } if Self::starts(is_start, h) => Self::start_from(is_start, h + 1) - 1,
+            FaceIndex::Mixed { .. } => h - 1,
+        }
+    }
+
+    /// First half-edge of the face of `h`, and their number.
+    #[inline(always)]
+    pub fn corners_at(&self, h: u32) -> (u32, u32) {
+        match self {
+            FaceIndex::Quads { .. } => (h & !3, 4),
+            FaceIndex::Mixed { is_start, .. } => {
+                let first = Self::first(is_start, h);
+                (first, Self::start_from(is_start, h + 1) - first)
+            }
+        }
+    }
+
     /// First half-edge (or patch) and number of them of a face.
     #[inline]
     pub fn corners(&self, face: u32) -> (u32, u32) {
@@ -91,20 +150,6 @@ impl FaceIndex {
             FaceIndex::Mixed { start, .. } => {
                 let s = start[face as usize];
                 (s, start[face as usize + 1] - s)
-            }
-        }
-    }
-
-    /// [`corners`](Self::corners) of the face of `h`: from the bits next to its own, which cost less than the face's number.
-    #[inline]
-    pub fn corners_at(&self, h: u32) -> (u32, u32) {
-        match self {
-            FaceIndex::Quads { .. } => (h & !3, 4),
-            FaceIndex::Mixed { is_start, .. } => {
-                let (word, bit) = (h as usize / 64, h % 64);
-                let start = last_bit(is_start, word, is_start[word] & (u64::MAX >> (63 - bit)));
-                let end = first_bit(is_start, word, is_start[word] & ((u64::MAX << bit) << 1));
-                (start, end - start)
             }
         }
     }
@@ -118,38 +163,26 @@ impl FaceIndex {
     }
 }
 
-/// The last bit that is set in the words up to `word`, of which only `bits` count.
-#[inline(always)]
-fn last_bit(words: &[u64], mut word: usize, mut bits: u64) -> u32 {
-    while bits == 0 {
-        word -= 1;
-        bits = words[word];
-    }
-    64 * word as u32 + 63 - bits.leading_zeros()
-}
-
-/// The first bit that is set in the words from `word` on, of which only `bits` count.
-#[inline(always)]
-fn first_bit(words: &[u64], mut word: usize, mut bits: u64) -> u32 {
-    while bits == 0 {
-        word += 1;
-        bits = words[word];
-    }
-    64 * word as u32 + bits.trailing_zeros()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn faces_and_corners_invert_each_other_for_mixed_sizes() {
-        let sizes: Vec<u32> = (0..500).map(|i| 3 + (i * 7) % 90).collect();
-        let index = FaceIndex::new(&sizes);
+    fn faces_and_corners_invert_each_other() {
+        let mixed: Vec<u32> = (0..500).map(|i| if i % 5 == 0 { 4 } else { 3 + (i * 7) % 290 }).collect();
+        [mixed, vec![4; 100], vec![64; 5]].iter().for_each(|sizes| check(sizes));
+    }
+
+    fn check(sizes: &[u32]) {
+        let index = FaceIndex::new(sizes);
         for f in 0..sizes.len() as u32 {
             let (start, n) = index.corners(f);
             assert_eq!(n, sizes[f as usize]);
-            assert!((start..start + n).all(|h| index.face(h) == f && index.corners_at(h) == (start, n)));
+            for h in start..start + n {
+                assert_eq!((index.face(h), index.corners_at(h)), (f, (start, n)));
+                assert_eq!(index.next(h), start + (h - start + 1) % n);
+                assert_eq!(index.prev(index.next(h)), h);
+            }
         }
     }
 }

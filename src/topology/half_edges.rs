@@ -17,6 +17,11 @@ pub struct VertexTags {
 }
 
 impl VertexTags {
+    /// Whether nothing is sharp here but infinitely sharp edges, if there are any.
+    pub fn is_smooth(&self) -> bool {
+        self.sharpness == 0.0 && self.semi_sharp.is_empty() && !self.is_pinned
+    }
+
     /// Number of sharp edges, semi-sharp or infinite.
     pub fn n_sharp(&self) -> usize {
         self.n_infinite as usize + self.semi_sharp.len()
@@ -33,25 +38,30 @@ pub trait HalfEdges {
     fn face(&self, h: u32) -> u32;
     /// The first half-edge of a face and its number of corners.
     fn face_corners(&self, face: u32) -> (u32, u32);
-    /// [`face_corners`](Self::face_corners) of the face of `h`.
-    #[inline]
-    fn corners_at(&self, h: u32) -> (u32, u32) {
-        self.face_corners(self.face(h))
-    }
     /// Sharpness of the edge of `h`.
     fn edge_sharpness(&self, h: u32) -> f32;
     /// Tags of the vertex where `h` starts.
     fn vertex_tags(&self, h: u32) -> VertexTags;
 
-    /// Whether the vertex where `h` starts is known to be smooth, with smooth edges, borders aside; `false` may mean anything.
+    /// Whether the vertex where `h` starts is known to be smooth, with smooth edges, borders aside, which have no other side
+    /// then; `false` may mean anything.
+    fn is_plain(&self, h: u32) -> bool;
+
+    /// Number of infinitely sharp edges at the vertex where `h` starts, all sectors counted.
     #[inline]
-    fn is_plain(&self, _h: u32) -> bool {
-        false
+    fn n_infinite(&self, h: u32) -> u32 {
+        self.vertex_tags(h).n_infinite
     }
 
     /// The ends of the two infinitely sharp edges at the vertex where `h` starts, where faces around the vertex may not
     /// reach both: at inner vertices of fins.
     fn crease_ends(&self, h: u32) -> Option<[u32; 2]>;
+
+    /// The first half-edge of the face of `h`, and its number of corners.
+    #[inline]
+    fn corners_at(&self, h: u32) -> (u32, u32) {
+        self.face_corners(self.face(h))
+    }
 
     /// The next half-edge of the face.
     #[inline]
