@@ -108,6 +108,33 @@ impl LocalMesh {
         &self.tags[self.vertex[h as usize] as usize]
     }
 
+    /// What is semi-sharp, at corners and at edges that touch them.
+    fn semi_sharp(&mut self) -> impl Iterator<Item = &mut f32> {
+        let tags = self.tags.iter_mut().flat_map(|tags| tags.semi_sharp.iter_mut().chain([&mut tags.sharpness]));
+        tags.chain(&mut self.sharpness).filter(|s| **s > 0.0 && s.is_finite())
+    }
+
+    /// The least of all that is semi-sharp; infinite if nothing is.
+    pub fn least_semi_sharp(&mut self) -> f32 {
+        self.semi_sharp().fold(f32::INFINITY, |least, s| least.min(*s))
+    }
+
+    /// Makes all that is semi-sharp less so, by as many steps of the uniform method as leave the least of it above 1. Returns
+    /// how many. Exact, as the steps themselves are.
+    pub fn lower(&mut self) -> u32 {
+        let least = self.least_semi_sharp();
+        let steps = if least.is_finite() { (least.ceil() - 2.0).max(0.0) } else { 0.0 };
+        if steps > 0.0 {
+            self.semi_sharp().for_each(|s| *s -= steps);
+        }
+        steps as u32
+    }
+
+    /// Makes all that is semi-sharp more so, by as many steps.
+    pub fn raise(&mut self, steps: u32) {
+        self.semi_sharp().for_each(|s| *s += steps as f32);
+    }
+
     /// Whether the sector of a corner with two infinitely sharp edges ends where there is no other side.
     fn is_bounded_by_nothing(&self, h: u32) -> bool {
         let faces = fan_size(self, h, |e| self.twin(e) == NONE);
@@ -300,6 +327,12 @@ fn add_word(hash: &mut u64, word: u32) {
     *hash = (hash.rotate_left(5) ^ u64::from(word)).wrapping_mul(0x517c_c1b7_2722_0a95);
 }
 
+/// What whole steps do not change of sharpness, as a word: rings on the way to smoothness are turned alike.
+fn fraction_bits(sharpness: f32) -> u32 {
+    let is_semi_sharp = sharpness > 0.0 && sharpness.is_finite();
+    if is_semi_sharp { (2.0 - sharpness.ceil() + sharpness).to_bits() } else { sharpness.to_bits() }
+}
+
 impl CornerSign {
     /// A face in the order of the fan: its number of corners, whether it lies clockwise, and the sharpness of the edge to it.
     #[inline(always)]
@@ -309,14 +342,14 @@ impl CornerSign {
         add_word(&mut self.layout, 2 * size + u32::from(is_clockwise));
         if sharpness > 0.0 {
             add_word(&mut self.tags, self.n_faces);
-            add_word(&mut self.tags, sharpness.to_bits());
+            add_word(&mut self.tags, fraction_bits(sharpness));
         }
     }
 
     fn add_tags(&mut self, tags: &VertexTags) {
-        add_word(&mut self.tags, tags.sharpness.to_bits());
+        add_word(&mut self.tags, fraction_bits(tags.sharpness));
         add_word(&mut self.tags, tags.n_infinite);
-        tags.semi_sharp.iter().for_each(|s| add_word(&mut self.tags, s.to_bits()));
+        tags.semi_sharp.iter().for_each(|s| add_word(&mut self.tags, fraction_bits(*s)));
     }
 
     fn is_irregular(&self, is_closed: bool) -> bool {
@@ -375,16 +408,18 @@ impl RingWalker {
         &self.ring
     }
 
-    /// The key and the sources of the ring from `first` on, whose corners are as `look` says. If they are not plain, all of
-    /// the ring is extracted on the way.
+    /// The key of the ring from `first` on, whose corners are as `look` says, and its sources. If it `lowers`, the key is that of
+    /// the ring that is [lower](LocalMesh::lower) by the steps that are returned.
     pub fn key<M: HalfEdges + ?Sized>(
         &mut self,
         mesh: &M,
         first: u32,
         look: Look,
         outer_tags: bool,
+        lowers: bool,
         key: &mut Vec<u32>,
-    ) -> &[u32] {
+    ) -> (u32, &[u32]) {
+        let mut steps = 0;
         let n_corners = self.walk(mesh, first);
         self.add_vertices::<M, true>(mesh, n_corners);
         if look.is_plain {
@@ -392,9 +427,11 @@ impl RingWalker {
             self.ring.mesh.plain_key(key);
         } else {
             self.write(mesh, n_corners, outer_tags);
-            self.ring.mesh.key(key);
+            let ring = &mut self.ring.mesh;
+            steps = if lowers { ring.lower() } else { 0 };
+            ring.key(key);
         }
-        &self.vertices.values
+        (steps, &self.vertices.values)
     }
 
     /// Looks at the corners of the face of `first`, without finding its ring.
@@ -635,7 +672,7 @@ mod tests {
                     let ring = extract(&topology, first + look.turn, outer_tags);
                     assert_eq!(walker.sources(&topology, first + look.turn), ring.sources);
                     let (mut key, mut of_ring) = (Vec::new(), Vec::new());
-                    walker.key(&topology, first + look.turn, look, outer_tags, &mut key);
+                    walker.key(&topology, first + look.turn, look, outer_tags, false, &mut key);
                     ring.mesh.key(&mut of_ring);
                     assert_eq!(key, of_ring);
                 }

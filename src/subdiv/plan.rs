@@ -11,18 +11,46 @@ use rustc_hash::FxHashMap;
 
 /// A node of the library and a turn: its number in the upper bits, and in the lower two at which corner of the face the
 /// node's corner 0 lies. So the four turns of a ring share a node. Polygons are not turned.
+///
+/// By the uniform method all semi-sharp edges and corners lose 1 a step, and as long as they are sharper than 1, a step is
+/// the same whatever they are. So rings whose sharpness differs by whole steps share a node, made for the one that is least
+/// sharp, and the bits between tell **how many steps** sharper than that a ring is.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct NodeId(pub u32);
 
+/// Bit of a node that is shared by rings of different sharpness, and the lowest of those that count steps: fewer than 10,
+/// which is infinitely sharp.
+const IS_SHARP: u32 = 1 << 2;
+const STEP_SHIFT: u32 = 3;
+const STEP_MASK: u32 = 15;
+const INDEX_SHIFT: u32 = 7;
+
 impl NodeId {
     /// The node itself.
-    fn unturned(index: usize) -> Self {
-        NodeId((index as u32) << 2)
+    pub(super) fn unturned(index: usize) -> Self {
+        NodeId((index as u32) << INDEX_SHIFT)
     }
 
     #[inline(always)]
     fn index(self) -> usize {
-        (self.0 >> 2) as usize
+        (self.0 >> INDEX_SHIFT) as usize
+    }
+
+    /// How many steps sharper the ring is than that of the node.
+    #[inline(always)]
+    fn steps(self) -> u32 {
+        (self.0 >> STEP_SHIFT) & STEP_MASK
+    }
+
+    /// For rings that are as much less sharp.
+    fn less_sharp(self, steps: u32) -> Self {
+        if self.0 & IS_SHARP == 0 { self } else { NodeId(self.0 - (steps << STEP_SHIFT)) }
+    }
+
+    /// For rings that are as much sharper.
+    #[inline(always)]
+    fn sharper(self, steps: u32) -> Self {
+        if self.0 & IS_SHARP == 0 { self } else { NodeId(self.0 + (steps << STEP_SHIFT)) }
     }
 
     /// The corner of the face where the node's corner 0 lies.
@@ -105,17 +133,16 @@ pub enum Plan<'a> {
 pub struct Children<'a> {
     all: &'a [Child],
     turn: u32,
+    /// Steps by which they are sharper.
+    steps: u32,
 }
 
 impl Children<'_> {
     /// The child at corner `k` of the face.
     #[inline(always)]
     pub fn get(&self, k: usize) -> Child {
-        if self.turn == 0 {
-            return self.all[k];
-        }
         let Child { node, points } = self.all[unturned(k, self.turn)];
-        Child { node: node.turned(self.turn), points }
+        Child { node: node.turned(self.turn).sharper(self.steps), points }
     }
 }
 
@@ -152,9 +179,31 @@ struct Node {
     /// Where its children start, and how many there are: 0 for regular nodes, [`NONE`] as long as it is being made.
     children: u32,
     n_children: u32,
+    /// Where its children start for rings that are sharper by one step; [`NONE`], here and in `children`, as long as no ring was.
+    sharper: u32,
+    /// By how many steps rings may be sharper, as bits: what is below those has been made.
+    ready: u16,
     /// Where its limits start, four if there are four children.
     limits: u32,
     in_hull: bool,
+}
+
+impl Default for Node {
+    fn default() -> Self {
+        let nothing = Span::default();
+        Node {
+            n_points: 0,
+            rows: SparseRows::default(),
+            shape: nothing,
+            n_pole: 0,
+            children: NONE,
+            n_children: 0,
+            sharper: NONE,
+            ready: 0,
+            limits: 0,
+            in_hull: true,
+        }
+    }
 }
 
 /// All nodes of meshes that share a [`RuleSet`].
@@ -214,15 +263,16 @@ impl PlanLibrary {
     /// A node's plan.
     #[inline]
     pub fn plan(&self, node: NodeId) -> Plan<'_> {
-        let turn = node.turn();
+        let (turn, steps) = (node.turn(), node.steps());
         let node = &self.nodes[node.index()];
         if node.n_children == 0 {
             return Plan::Regular(node.rows, turn);
         }
-        let children = &self.children[node.children as usize..][..node.n_children as usize];
+        let (start, steps) = if steps == 0 { (node.children, 0) } else { (node.sharper, steps - 1) };
+        let children = &self.children[start as usize..][..node.n_children as usize];
         let n_limits = if children.len() == 4 { 4 } else { 0 };
         let limits = &self.limits[node.limits as usize..][..n_limits];
-        let (children, limits) = (Children { all: children, turn }, Limits { all: limits, turn });
+        let (children, limits) = (Children { all: children, turn, steps }, Limits { all: limits, turn });
         let pole = (node.n_pole != 0).then(|| node.shape.split_at(node.n_pole)[0]);
         Plan::Split { step: Step { rows: node.rows, pole }, children, limits, in_hull: node.in_hull }
     }
@@ -240,7 +290,12 @@ impl PlanLibrary {
 
     /// Whether rings keep the semi-sharp edges of vertices that are not corners of their target.
     pub fn outer_tags(&self) -> bool {
-        self.rules.crease_method == CreaseMethod::Chaikin
+        self.rules.keeps_outer_tags()
+    }
+
+    /// Whether rings are found by the keys of less sharp ones.
+    pub fn lowers(&self) -> bool {
+        self.rules.lowers()
     }
 
     /// Bytes held.
@@ -261,30 +316,49 @@ impl PlanLibrary {
         self.limits.shrink_to_fit();
     }
 
-    /// The node for a ring, if it is known.
-    pub fn find(&self, key: &[u32]) -> Option<NodeId> {
-        self.by_key.get(key).copied()
+    /// The node for a ring that is so many steps sharper than the one with this key, if it is known.
+    pub fn find(&self, key: &[u32], steps: u32) -> Option<NodeId> {
+        let id = self.by_key.get(key)?.sharper(steps);
+        let is_ready = id.0 & IS_SHARP == 0 || self.nodes[id.index()].ready >> id.steps() & 1 == 1;
+        is_ready.then_some(id)
     }
 
     /// The node for a ring, made if it is new.
     pub fn node(&mut self, ring: &LocalMesh) -> NodeId {
+        let mut ring = ring.clone();
+        let steps = if self.lowers() { ring.lower() } else { 0 };
+        self.node_above(&mut ring, steps)
+    }
+
+    /// The node for a ring that is so many steps sharper than this one, made if it is new.
+    fn node_above(&mut self, ring: &mut LocalMesh, steps: u32) -> NodeId {
         let mut key = std::mem::take(&mut self.key);
         ring.key(&mut key);
-        let id = self.find(&key).unwrap_or_else(|| self.make_node(ring, &key));
+        let id = self.by_key.get(&key).copied();
+        let id = id.unwrap_or_else(|| self.make_node(ring, &key)).sharper(steps);
         self.key = key;
+        if id.0 & IS_SHARP != 0 && self.nodes[id.index()].ready >> steps & 1 == 0 {
+            self.nodes[id.index()].ready |= 1 << steps;
+            ring.raise(steps);
+            self.split_sharp(id, ring);
+        }
         id
     }
 
-    /// The node for a ring that is new.
-    fn make_node(&mut self, ring: &LocalMesh, key: &[u32]) -> NodeId {
-        let id = NodeId::unturned(self.nodes.len());
+    /// The node for a ring that is new. What is below it is not known yet if others can be sharper by some steps.
+    fn make_node(&mut self, ring: &mut LocalMesh, key: &[u32]) -> NodeId {
+        let least = ring.least_semi_sharp();
+        let is_sharp = self.lowers() && least > 1.0 && least.is_finite();
+        let id = NodeId(NodeId::unturned(self.nodes.len()).0 | if is_sharp { IS_SHARP } else { 0 });
         let nothing = self.rows.push([]);
         let n_points = ring.n_vertices() as u32;
         let shape = self.rows.push_indices(&route(ring));
-        let node =
-            Node { n_points, rows: nothing, shape, n_pole: 0, children: 0, n_children: NONE, limits: 0, in_hull: true };
+        let node = Node { n_points, rows: nothing, shape, n_children: NONE, ..Node::default() };
         self.nodes.push(node);
         self.by_key.insert(key.to_vec(), id);
+        if is_sharp {
+            return id;
+        }
         let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
         match regular {
             Some(rows) => {
@@ -298,32 +372,63 @@ impl PlanLibrary {
 
     fn split(&mut self, id: NodeId, ring: &LocalMesh) {
         let n = ring.n_corners();
-        let (rows, quarters, pole) = self.quarters(ring);
-        let rows = self.rows.push(&rows);
+        let refined = RefinedView::new(self.rules, ring);
+        let (mut rows, pole) = RefinedRows::new(self.rules, ring, &refined);
+        let quarters = self.quarters(&refined, n, &mut rows);
+        let rows = self.rows.push(&rows.rows);
         if !pole.is_empty() {
             let shape = self.rows.push_indices(&[&pole[..], &route(ring)].concat());
             let node = &mut self.nodes[id.index()];
             (node.shape, node.n_pole) = (shape, pole.len() as u32);
         }
-        let children: Vec<Child> = quarters
-            .into_iter()
-            .map(|Quarter { node, turn, points }| {
-                let node = node.unwrap_or_else(|ring| self.node(&ring)).turned(turn);
-                self.plain_child(node, &points)
-                    .unwrap_or_else(|| Child { node, points: self.rows.push_indices(&points) })
-            })
-            .collect();
+        let children: Vec<Child> = quarters.into_iter().map(|quarter| self.child(quarter)).collect();
+        self.finish(id, ring, rows, &children);
+        self.nodes[id.index()].children = self.children.len() as u32;
+        self.children.extend(children);
+    }
+
+    /// Finds what is below a ring whose node can be that of sharper ones, too. The first of them gives the node its rows: all
+    /// have the same.
+    fn split_sharp(&mut self, id: NodeId, ring: &LocalMesh) {
+        let refined = RefinedView::new(self.rules, ring);
+        let (mut rows, _) = RefinedRows::new(self.rules, ring, &refined);
+        let is_first = self.nodes[id.index()].ready.count_ones() == 1;
+        rows.is_dry = !is_first;
+        let quarters = self.quarters(&refined, ring.n_corners(), &mut rows);
+        let rows = is_first.then(|| self.rows.push(&rows.rows));
+        let children: Vec<Child> = quarters.into_iter().map(|quarter| self.child(quarter)).collect();
+        if let Some(rows) = rows {
+            self.finish(id, ring, rows, &children);
+        }
+        let node = &mut self.nodes[id.index()];
+        let (start, above) = match id.steps() {
+            0 => (&mut node.children, 0),
+            steps => (&mut node.sharper, steps - 1),
+        };
+        if *start == NONE {
+            *start = self.children.len() as u32;
+            self.children.extend(children.iter().map(|c| Child { node: c.node.less_sharp(above), ..*c }));
+        }
+    }
+
+    /// Gives a node all but its children.
+    fn finish(&mut self, id: NodeId, ring: &LocalMesh, rows: SparseRows, children: &[Child]) {
+        let n = ring.n_corners();
         let n_limits = if n == 4 { 4 } else { 0 };
         let limits: Vec<Limit> = (0..n_limits).map(|k| self.limit(id, ring, rows, &children[k as usize], k)).collect();
         // Those of other vertices count only for edges to such corners.
         let semi_sharp = (0..n).any(|k| !ring.tags_at(k).semi_sharp.is_empty());
         let node = &mut self.nodes[id.index()];
-        node.rows = rows;
+        (node.rows, node.n_children) = (rows, n);
         node.in_hull = !(self.rules.crease_method == CreaseMethod::Chaikin && semi_sharp);
-        (node.children, node.n_children) = (self.children.len() as u32, n);
         node.limits = self.limits.len() as u32;
-        self.children.extend(children);
         self.limits.extend(limits);
+    }
+
+    fn child(&mut self, quarter: Quarter) -> Child {
+        let Quarter { node, steps, turn, points } = quarter;
+        let node = node.unwrap_or_else(|mut ring| self.node_above(&mut ring, steps)).turned(turn);
+        self.plain_child(node, &points).unwrap_or_else(|| Child { node, points: self.rows.push_indices(&points) })
     }
 
     /// The child at a regular node whose control points are points of its ring: those are all the points it has then.
@@ -344,52 +449,33 @@ impl PlanLibrary {
     fn push_plain(&mut self) -> NodeId {
         let id = NodeId::unturned(self.nodes.len());
         let (rows, shape) = (self.rows.push([]), self.rows.push_indices(&[]));
-        self.nodes.push(Node {
-            n_points: 16,
-            rows,
-            shape,
-            n_pole: 0,
-            children: 0,
-            n_children: 0,
-            limits: 0,
-            in_hull: true,
-        });
+        self.nodes.push(Node { n_points: 16, rows, shape, ..Node::default() });
         id
     }
 
-    /// Rows of the refined points that any quarter uses, and each quarter: its node, or its ring if that is new, and its
-    /// points in terms of those rows; and the ring in a pole's order, if it is one.
-    fn quarters(&mut self, ring: &LocalMesh) -> (Vec<Row>, Vec<Quarter>, Vec<u32>) {
-        let refined = RefinedView::new(self.rules, ring);
-        let mut rows =
-            RefinedRows { rules: self.rules, ring, place: vec![NONE; refined.origin.len()], rows: Vec::new() };
-        let n = ring.n_corners();
-        if n != 4 {
-            rows.place_of(&refined, refined.face_vertex(0));
-        }
-        let mut pole_ring = Vec::new();
-        if let Some(pole) = Pole::new(ring)
-            && let Some(points) = pole.refined(&refined)
-        {
-            points.into_iter().for_each(|v| _ = rows.place_of(&refined, v));
-            pole_ring = pole.ring();
-        }
+    /// Each quarter of a ring: its node, or its ring if that is new, and its points in terms of `rows`, which become more by
+    /// those that are not there yet.
+    fn quarters(&mut self, refined: &RefinedView<'_>, n: u32, rows: &mut RefinedRows<'_>) -> Vec<Quarter> {
         let (mut walker, mut key) = (std::mem::take(&mut self.walker), Vec::new());
         let quarters = (0..n).map(|k| {
             let start = child_start(n, k);
-            let look = walker.look(&refined, start);
+            let look = walker.look(refined, start);
             let turned = start & !3 | (start + look.turn) & 3;
-            let sources = walker.key(&refined, turned, look, self.outer_tags(), &mut key);
-            let points = sources.iter().map(|&v| rows.place_of(&refined, v)).collect();
-            let node = self.find(&key).ok_or_else(|| {
-                walker.extract(&refined, turned, self.outer_tags());
-                walker.take().mesh
+            let (steps, sources) = walker.key(refined, turned, look, self.outer_tags(), self.lowers(), &mut key);
+            let points = sources.iter().map(|&v| rows.place_of(refined, v)).collect();
+            let node = self.find(&key, steps).ok_or_else(|| {
+                walker.extract(refined, turned, self.outer_tags());
+                let mut ring = walker.take().mesh;
+                if self.lowers() {
+                    ring.lower();
+                }
+                ring
             });
-            Quarter { node, turn: look.turn, points }
+            Quarter { node, steps, turn: look.turn, points }
         });
         let quarters = quarters.collect();
         self.walker = walker;
-        (rows.rows, quarters, pole_ring)
+        quarters
     }
 
     fn limit(&mut self, id: NodeId, ring: &LocalMesh, rows: SparseRows, child: &Child, k: u32) -> Limit {
@@ -407,6 +493,8 @@ impl PlanLibrary {
                 Limit::Smooth(self.rows.push([&position, &du, &dv]))
             }
             CornerLimit::Iterate if child.node == id => Limit::Position(self.iterate(ring, rows, child, k)),
+            // How far down it is differs among the rings of this node.
+            _ if id.0 & IS_SHARP != 0 => Limit::Regular,
             CornerLimit::Iterate | CornerLimit::Descend => self.pull_back(rows, child, k),
         }
     }
@@ -414,6 +502,9 @@ impl PlanLibrary {
     /// A child's limit at its corner, in terms of this ring's points. Only of its position: to walk down for tangents takes
     /// longer, but they are asked for one by one, and would be most of what libraries of semi-sharp meshes hold.
     fn pull_back(&mut self, rows: SparseRows, child: &Child, corner: u32) -> Limit {
+        if child.node.0 & IS_SHARP != 0 {
+            return Limit::Regular;
+        }
         let limit = match self.plan(child.node) {
             Plan::Regular(..) => Limit::Regular,
             Plan::Split { limits, .. } => limits.get(corner as usize).expect("quarters have four corners"),
@@ -467,8 +558,10 @@ pub(super) const TURNED_CONTROL: [[u8; 16]; 4] = [
 
 /// A quarter that is becoming a child.
 struct Quarter {
-    /// Its node, or its ring if that is new.
+    /// Its node, or the ring for which that is made, if it is new.
     node: Result<NodeId, LocalMesh>,
+    /// How many steps sharper it is than that ring.
+    steps: u32,
     /// See [`NodeId::turn`].
     turn: u32,
     points: Vec<u32>,
@@ -481,15 +574,34 @@ struct RefinedRows<'a> {
     /// For each refined point its row, or [`NONE`].
     place: Vec<u32>,
     rows: Vec<Row>,
+    /// Whether rows are only counted.
+    is_dry: bool,
 }
 
-impl RefinedRows<'_> {
+impl<'a> RefinedRows<'a> {
+    /// With the face point, if the target is a polygon, or all of a pole's, with the ring in a pole's order.
+    fn new(rules: RuleSet, ring: &'a LocalMesh, refined: &RefinedView<'_>) -> (Self, Vec<u32>) {
+        let mut rows =
+            RefinedRows { rules, ring, place: vec![NONE; refined.origin.len()], rows: Vec::new(), is_dry: false };
+        if ring.n_corners() != 4 {
+            rows.place_of(refined, refined.face_vertex(0));
+        }
+        if let Some(pole) = Pole::new(ring)
+            && let Some(points) = pole.refined(refined)
+        {
+            points.into_iter().for_each(|v| _ = rows.place_of(refined, v));
+            return (rows, pole.ring());
+        }
+        (rows, Vec::new())
+    }
+
     fn place_of(&mut self, refined: &RefinedView<'_>, v: u32) -> u32 {
         let place = &mut self.place[v as usize];
         if *place == NONE {
             *place = self.rows.len() as u32;
             let origin = corner_origin(self.ring, refined.origin[v as usize]);
-            self.rows.push(rules::refined_row(&self.rules, self.ring, origin));
+            let row = if self.is_dry { Row::new() } else { rules::refined_row(&self.rules, self.ring, origin) };
+            self.rows.push(row);
         }
         *place
     }

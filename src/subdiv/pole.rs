@@ -308,7 +308,7 @@ mod tests {
         for valence in [3, 5, 6, 7, 8, 32, 100] {
             let surface = Surface::new(&shapes::quad_pole(valence), 1).unwrap();
             let library = surface.plans();
-            for node in (0..library.len() as u32).map(|index| NodeId(4 * index)) {
+            for node in (0..library.len() as u32).map(|index| NodeId::unturned(index as usize)) {
                 let Plan::Split { step, .. } = library.plan(node) else { continue };
                 if step.pole.is_none() {
                     continue;

@@ -9,7 +9,7 @@ use super::rules::Row;
 use rustc_hash::FxHashMap;
 
 /// Rows of a [`RowStore`]: a list of their numbers.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct SparseRows {
     first: u32,
     len: u32,
@@ -29,7 +29,7 @@ impl SparseRows {
 }
 
 /// A list of indices in a [`RowStore`].
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Span {
     first: u32,
     len: u32,

@@ -20,6 +20,18 @@ pub struct RuleSet {
     pub triangles: TriangleRule,
 }
 
+impl RuleSet {
+    /// Whether rings keep the semi-sharp edges of vertices that are not corners of their target.
+    pub fn keeps_outer_tags(&self) -> bool {
+        self.crease_method == CreaseMethod::Chaikin
+    }
+
+    /// Whether all sharpness decays alike, so that rings are found by the keys of less sharp ones.
+    pub fn lowers(&self) -> bool {
+        self.crease_method == CreaseMethod::Uniform
+    }
+}
+
 /// Weight of each face point for an edge beside a triangle, with smooth triangles (OpenSubdiv).
 const SMOOTH_TRIANGLE_WEIGHT: f64 = 0.470;
 

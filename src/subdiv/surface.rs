@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::ids::{FaceId, PatchId};
 use crate::math::{DBounds, PointGrid};
 use crate::mesh::ControlMesh;
-use crate::topology::{FaceIndex, HalfEdges, NONE, Topology};
+use crate::topology::{FaceIndex, HalfEdges, Topology};
 use glam::DVec3;
 use parking_lot::RwLock;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -480,9 +480,11 @@ fn plan_face(
     if look.is_regular {
         return REGULAR;
     }
-    let outer_tags = library.read().outer_tags();
-    walker.key(topology, first + look.turn, look, outer_tags, key);
-    let known = library.read().find(key);
+    // One lock at a time: a second one would wait behind a writer that waits for the first.
+    let rules = library.read().rules();
+    let (outer_tags, lowers) = (rules.keeps_outer_tags(), rules.lowers());
+    let (steps, _) = walker.key(topology, first + look.turn, look, outer_tags, lowers, key);
+    let known = library.read().find(key, steps);
     let make = || library.write().node(&walker.extract(topology, first + look.turn, outer_tags).mesh);
     known.unwrap_or_else(make).turned(look.turn)
 }
@@ -492,6 +494,7 @@ mod tests {
     use super::*;
     use crate::mesh::random::random_mesh;
     use crate::mesh::shapes;
+    use crate::topology::NONE;
 
     /// As [`regular_ring`], checked on the way: the 16 vertices around an untagged quad with regular corners, u fastest, by plain hops; `None` for other faces.
     fn slow_regular_ring(topology: &Topology, first: u32) -> Option<[u32; 16]> {
