@@ -9,6 +9,8 @@
 //!                                                                 because the cache is gone by then
 //! ```
 
+use super::adaptive::canvas_window;
+use super::canvas::Canvas;
 use super::cells::Tile;
 use super::film::Film;
 use super::footprint::Footprints;
@@ -86,8 +88,13 @@ fn group_bytes(settings: &RenderSettings, threads: usize) -> usize {
     match settings.groups {
         Groups::Off => 0,
         Groups::Thesis => super::thesis::max_bytes(settings),
-        Groups::Adaptive => threads * (Footprints::BYTES + Tile::BYTES),
+        Groups::Adaptive => threads * (Footprints::BYTES + Tile::BYTES) + canvas_bytes(settings),
     }
+}
+
+/// Bytes of the canvas of adaptive groups, besides those of the film.
+fn canvas_bytes(settings: &RenderSettings) -> usize {
+    Canvas::n_bytes(canvas_window(settings), &settings.aovs) - Film::n_bytes(settings.window, &settings.aovs)
 }
 
 /// The error of a budget below `smallest`, which is needed for `what`. Names a little more, because what is resident

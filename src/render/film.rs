@@ -4,6 +4,7 @@ use super::groups::NO_GROUP;
 use super::reason::Reason;
 use super::tiles::PixelRect;
 use super::tracer::Built;
+use std::ops::Range;
 use std::str::FromStr;
 
 /// What a film can store besides colour. Geometry is that of sample 0, at the pixel's centre.
@@ -158,6 +159,13 @@ impl PlaneData {
         }
     }
 
+    fn part<R: Iterator<Item = Range<usize>>>(&self, rows: impl Fn() -> R) -> Self {
+        match self {
+            Self::Float(channels) => Self::Float(channels.iter().map(|channel| of_rows(channel, rows())).collect()),
+            Self::Id(ids) => Self::Id(of_rows(ids, rows())),
+        }
+    }
+
     fn set(&mut self, aov: Aov, idx: usize, record: &PixelRecord) {
         let first = &record.first;
         match self {
@@ -183,6 +191,10 @@ impl PlaneData {
             }
         }
     }
+}
+
+fn of_rows<T: Copy>(all: &[T], rows: impl Iterator<Item = Range<usize>>) -> Vec<T> {
+    rows.flat_map(|row| all[row].iter().copied()).collect()
 }
 
 fn saturated(n: u64) -> u32 {
@@ -240,6 +252,20 @@ impl Film {
     /// The plane of one AOV, if it was asked for.
     pub fn plane(&self, aov: Aov) -> Option<&PlaneData> {
         self.planes.iter().find(|(a, _)| *a == aov).map(|(_, plane)| plane)
+    }
+
+    /// The part of it that covers `window`, which lies within its own.
+    pub fn part(&self, window: PixelRect) -> Self {
+        let rows = || {
+            (window.y0..window.y1).map(|y| self.idx([window.x0, y])).map(|first| first..first + window.width() as usize)
+        };
+        let planes = self.planes.iter().map(|(aov, plane)| (*aov, plane.part(rows)));
+        Self {
+            window,
+            colors: of_rows(&self.colors, rows()),
+            done: of_rows(&self.done, rows()),
+            planes: planes.collect(),
+        }
     }
 
     /// Exposes one pixel of the window.

@@ -3,7 +3,7 @@
 use super::*;
 use crate::cache::CacheConfig;
 use crate::image::display::display_value;
-use crate::image::missed::missed_ids;
+use crate::image::missed::{missed_ids, missed_objects};
 use crate::math::{Hit, Intersect, PrimitiveRef, Ray};
 use crate::mesh::ControlMesh;
 use crate::render::adaptive::render_adaptive;
@@ -14,7 +14,7 @@ use crate::scene::description::{Albedo, CameraDescription, Light, Material};
 use crate::scene::intersect::Intersector;
 use crate::scene::rate::DicingRate;
 use crate::scene::world::{GridCache, World, WorldMesh};
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DQuat, DVec3, Vec3};
 use parking_lot::Mutex;
 use std::sync::atomic::AtomicBool;
 
@@ -315,4 +315,31 @@ fn edge_pixels_alone_get_more_samples_and_the_mean_stays_within_tolerance() {
         assert!(expected.contains(&n), "{n}");
     }
     assert!(grouped.rays.total() * 3 < full.rays.total(), "{} of {}", grouped.rays.total(), full.rays.total());
+}
+
+/// Thin rods on a floor that mirrors: footprints know the rods, but not where their shadows and images end. Once, every
+/// second of them lost some of its length, some between the probes of a group, some beyond the side of a tile.
+#[test]
+fn what_is_thin_and_ends_between_probes_is_found_along_its_length() {
+    let size = [320, 224];
+    let display = |film: &Film| film.colors().iter().map(|c| c.map(display_value)).collect::<Vec<_>>();
+    let (left, right) = (DVec3::new(-3.0, 7.0, 4.0), DVec3::new(1.0, 5.5, 6.0));
+    for (thickness, eye) in [(0.06, left), (0.06, right), (0.04, left)] {
+        let rods: Vec<_> = (0..28).map(|k| rod(k, thickness)).collect();
+        let stage = Stage::new(eye, &rods, Material { mirror: Vec3::splat(0.5), ..Material::default() });
+        for tolerance in [1.0, 5.0, 10.0].map(|n| n / 255.0) {
+            let at = |groups| RenderSettings { size, window: PixelRect::whole(size), tolerance, ..settings(groups) };
+            let [full, grouped] = [Groups::Off, Groups::Adaptive].map(|groups| stage.render(&at(groups), 2).film);
+            let [a, b] = [&full, &grouped].map(display);
+            let missed = [(&a, &b), (&b, &a)].map(|(a, b)| missed_objects(size[0] as usize, a, b));
+            assert_eq!(missed, [0, 0], "{thickness} at {tolerance}");
+            assert!(share_above(&full, &grouped, tolerance) < 3e-4, "{thickness} at {tolerance}");
+        }
+    }
+}
+
+fn rod(k: u32, thickness: f64) -> DAffine3 {
+    let place = DVec3::new(f64::from(k % 7) * 0.93 - 2.8, -0.3, f64::from(k / 7) * 1.17 - 1.0);
+    let tilt = DQuat::from_rotation_x(0.3 * f64::from(k % 3) - 0.3) * DQuat::from_rotation_z(0.13 * f64::from(k % 5));
+    DAffine3::from_scale_rotation_translation(DVec3::new(thickness, 1.0, thickness), tilt, place)
 }

@@ -26,8 +26,10 @@ pub mod adaptive;
 #[cfg(test)]
 mod analytic;
 pub mod budget;
+mod canvas;
 mod cells;
 pub mod film;
+mod follow;
 mod footprint;
 #[cfg(test)]
 mod group_tests;

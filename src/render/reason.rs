@@ -26,7 +26,7 @@ pub enum Reason {
     Crease,
     /// Traced: a probe contradicted the interpolation by more than the tolerance.
     Contradiction,
-    /// Traced: beside a group with an edge in it.
+    /// Traced: beside an edge, which may go on.
     Neighbour,
     /// Not traced: from the group's corners.
     Interpolated,
@@ -63,7 +63,7 @@ impl Reason {
 
     /// Whether that edge is one that footprints know nothing of.
     pub(super) fn is_edge_of_light(self) -> bool {
-        matches!(self, Self::Shadow | Self::Reflection)
+        matches!(self, Self::Shadow | Self::Reflection | Self::Contradiction)
     }
 }
 
@@ -75,6 +75,12 @@ impl PixelCounts {
     /// Counts `n` pixels.
     pub fn add(&mut self, reason: Reason, n: u64) {
         self.0[reason as usize] += n;
+    }
+
+    /// Of the pixels that were counted, `n` have another reason now.
+    pub fn change(&mut self, from: Reason, to: Reason, n: u64) {
+        self.0[from as usize] -= n;
+        self.0[to as usize] += n;
     }
 
     /// Pixels with this reason.

@@ -39,6 +39,12 @@ impl PixelRect {
         (self.y0..self.y1).flat_map(move |y| (self.x0..self.x1).map(move |x| [x, y]))
     }
 
+    /// The pixels that both have; it is empty if there are none.
+    pub fn intersection(self, other: Self) -> Self {
+        let [x0, y0] = [self.x0.max(other.x0), self.y0.max(other.y0)];
+        Self { x0, y0, x1: self.x1.min(other.x1).max(x0), y1: self.y1.min(other.y1).max(y0) }
+    }
+
     /// Index of pixel (x, y) of the whole picture among [`Self::pixels`]; `None` outside.
     pub fn idx(&self, [x, y]: [u32; 2]) -> Option<usize> {
         let inside = (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y);

@@ -6,7 +6,6 @@ use crate::math::DBounds;
 use crate::mesh::shapes;
 use crate::render::sampler::pcg;
 use crate::scene::description::Glass;
-use glam::DQuat;
 
 const SIZE: [u32; 2] = [144, 96];
 
