@@ -20,16 +20,15 @@
 //!    sides before edges are followed across; tiles lie at multiples of 64 pixels, whatever the window. So neither threads nor
 //!    a crop change a pixel. A picture that was cancelled may lack edges that lead from one tile to the next.
 //! 3. A pixel that is not interpolated has, bit for bit, the colour that it has without groups; but where pixels have several
-//!    samples, one that looks like its neighbours, or its interpolation, after the first sample, and the same after a second,
-//!    keeps those two.
+//!    samples, one that looks like its neighbours after the first sample, and the same after a second, keeps those two.
 //!
 //! Ke, "Feature Adaptive Ray Tracing of Subdivision Surfaces", 2017, chapter 5.3 (groups); Akimoto et al., "Pixel-selected
 //! ray tracing", 1991 (refinement by prediction).
 
-use super::canvas::{Canvas, Surprises};
+use super::canvas::{Canvas, Surprises, look};
 use super::cells::{CELL_SIDES, Cell, CellPlace, TILE_SIDE, Tile, TracedProbe};
 use super::film::{FirstHit, PixelRecord};
-use super::follow::{display_difference, follow, is_surprised};
+use super::follow::{Origin, display_difference, follow, is_surprised};
 use super::footprint::{Claim, Footprints, Scenery};
 use super::integrators::{LightMasks, Probe, Sample, Shader, Smooth, SmoothPoint};
 use super::rays::RayCounts;
@@ -224,14 +223,14 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// Follows edges that traced pixels of the tile show into its groups.
     fn follow_within(&mut self, tile: PixelRect, records: &mut [PixelRecord]) {
-        let edge = self.job.edge();
-        let look = |pixel| tile.idx(pixel).map(|idx| records[idx].look());
-        let surprised = tile.pixels().filter(|&pixel| is_surprised(pixel, edge, |_| true, look)).collect();
+        let (edge, spp) = (self.job.edge(), self.job.settings.spp);
+        let look_at = |pixel| tile.idx(pixel).map(|idx| look(&records[idx], spp));
+        let surprised = tile.pixels().filter(|&pixel| is_surprised(pixel, edge, |_| true, look_at)).collect();
         follow(tile, surprised, |pixel| {
             let record = &mut records[tile.idx(pixel).expect("edges are followed within the tile")];
             let expected = Vec3::from(record.color);
-            record.reason == Reason::Interpolated && {
-                *record = self.followed(pixel, expected);
+            look(record, spp).origin == Origin::Interpolated && {
+                *record = self.followed(pixel);
                 display_difference(expected, Vec3::from(record.color)) > edge
             }
         });
@@ -242,7 +241,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         let Surprises { tile, pixels } = surprises;
         follow(*tile, pixels.clone(), |pixel| {
             let Some(expected) = canvas.lock().interpolated(pixel) else { return false };
-            let record = self.followed(pixel, expected);
+            let record = self.followed(pixel);
             canvas.lock().correct(pixel, &record);
             if self.job.settings.window.idx(pixel).is_some() {
                 self.outcome.pixels.add(record.reason, 1);
@@ -251,15 +250,9 @@ impl<T: Tracer> Worker<'_, '_, T> {
         });
     }
 
-    /// Traces a pixel that was expected to have some radiance. Of several samples, two are enough if they have.
-    fn followed(&mut self, pixel: [u32; 2], expected: Vec3) -> PixelRecord {
-        let Interpolation { settings, .. } = *self.job;
-        let mut exposure = Exposure::default();
-        self.job.pixels().expose(&mut self.shader, pixel, &mut exposure, settings.spp.min(2));
-        if display_difference(expected, exposure.mean()) > 0.5 * settings.tolerance {
-            self.job.pixels().expose(&mut self.shader, pixel, &mut exposure, settings.spp);
-        }
-        PixelRecord { reason: Reason::Neighbour, ..exposure.record() }
+    /// All samples of a pixel that an edge may reach.
+    fn followed(&mut self, pixel: [u32; 2]) -> PixelRecord {
+        PixelRecord { reason: Reason::Neighbour, ..self.job.pixels().trace(&mut self.shader, pixel) }
     }
 
     /// For integrators whose samples are random, and crowds of patches: what no patch reaches is known all the same.

@@ -42,7 +42,7 @@ impl Canvas {
         self.film.store(tile, records);
         for (pixel, record) in tile.pixels().zip(records) {
             let idx = self.idx(pixel);
-            match origin(record.reason) {
+            match look(record, 1).origin {
                 Origin::Interpolated => self.interpolated[idx / 64] |= 1 << (idx % 64),
                 Origin::Traced => self.traced[idx / 64] |= 1 << (idx % 64),
                 Origin::Other => {}
@@ -111,17 +111,14 @@ fn has(bits: &[u64], idx: usize) -> bool {
     bits[idx / 64] >> (idx % 64) & 1 != 0
 }
 
-impl PixelRecord {
-    /// As one that may surprise or be surprised.
-    pub(super) fn look(&self) -> Look {
-        Look { origin: origin(self.reason), color: Vec3::from(self.color), mesh: self.first.mesh }
-    }
-}
-
-fn origin(reason: Reason) -> Origin {
-    match reason {
+/// What of a pixel may surprise or be surprised, where pixels have `spp` samples.
+pub(super) fn look(record: &PixelRecord, spp: u32) -> Look {
+    let origin = match record.reason {
         Reason::Interpolated => Origin::Interpolated,
+        // One sample alone may have missed an edge.
+        Reason::Corner | Reason::Probe if spp > 1 => Origin::Interpolated,
         Reason::Background | Reason::Corner | Reason::Probe => Origin::Other,
         _ => Origin::Traced,
-    }
+    };
+    Look { origin, color: Vec3::from(record.color), mesh: record.first.mesh }
 }
