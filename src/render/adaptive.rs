@@ -28,7 +28,7 @@
 use super::canvas::{Canvas, Surprises, look};
 use super::cells::{CELL_SIDES, Cell, CellPlace, TILE_SIDE, Tile, TracedProbe};
 use super::film::{FirstHit, PixelRecord};
-use super::follow::{Origin, display_difference, follow, is_surprised};
+use super::follow::{Origin, beside_traced, display_difference, follow, is_surprised};
 use super::footprint::{Claim, Footprints, Scenery};
 use super::integrators::{LightMasks, Probe, Sample, Shader, Smooth, SmoothPoint};
 use super::rays::RayCounts;
@@ -225,7 +225,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
     fn follow_within(&mut self, tile: PixelRect, records: &mut [PixelRecord]) {
         let (edge, spp) = (self.job.edge(), self.job.settings.spp);
         let look_at = |pixel| tile.idx(pixel).map(|idx| look(&records[idx], spp));
-        let surprised = tile.pixels().filter(|&pixel| is_surprised(pixel, edge, |_| true, look_at)).collect();
+        let nearby = beside_traced(tile, records.iter().map(|record| look(record, spp).origin));
+        let surprised = nearby.filter(|&pixel| is_surprised(pixel, edge, |_| true, look_at)).collect();
         follow(tile, surprised, |pixel| {
             let record = &mut records[tile.idx(pixel).expect("edges are followed within the tile")];
             let expected = Vec3::from(record.color);

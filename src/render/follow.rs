@@ -9,6 +9,7 @@
 //! 1. Which pixels are traced does not depend on the order they are looked at in: a pixel is if it was surprised, which is
 //!    decided before any is followed, or lies close to one that contradicts.
 
+use super::cells::TILE_SIDE;
 use super::tiles::PixelRect;
 use crate::image::display::display_value;
 use glam::Vec3;
@@ -56,6 +57,26 @@ pub(super) fn is_surprised(
         let [here, behind, beside] = [here, behind, beside].map(|look| shown(look.color));
         largest(2.0 * here - behind - beside) > tolerance
     })
+}
+
+/// Interpolated pixels of a tile beside a traced one: all that can be surprised. `origins` are those of its pixels, row by row.
+pub(super) fn beside_traced(tile: PixelRect, origins: impl Iterator<Item = Origin>) -> impl Iterator<Item = [u32; 2]> {
+    let mut traced = [0u128; TILE_SIDE as usize + 2];
+    let mut interpolated = [0u128; TILE_SIDE as usize];
+    for ([x, y], origin) in tile.pixels().zip(origins) {
+        let (row, bit) = ((y - tile.y0) as usize, 1 << (x - tile.x0 + 1));
+        match origin {
+            Origin::Interpolated => interpolated[row] |= bit,
+            Origin::Traced => traced[row + 1] |= bit,
+            Origin::Other => {}
+        }
+    }
+    let is_beside = move |[x, y]: &[u32; 2]| {
+        let (row, column) = ((y - tile.y0) as usize, x - tile.x0);
+        let around = traced[row] | traced[row + 1] | traced[row + 2];
+        interpolated[row] >> (column + 1) & 1 != 0 && around >> column & 7 != 0
+    };
+    tile.pixels().filter(is_beside)
 }
 
 /// Goes on from each of the `waiting` pixels. `trace` traces one if it is interpolated, and then says whether it contradicts.
