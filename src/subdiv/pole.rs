@@ -307,19 +307,19 @@ mod tests {
         let mut n_poles = 0;
         for valence in [3, 5, 6, 7, 8, 32, 100] {
             let surface = Surface::new(&shapes::quad_pole(valence), 1).unwrap();
-            let library = surface.plans();
-            for node in (0..library.len() as u32).map(|index| NodeId::unturned(index as usize)) {
-                let Plan::Split { step, .. } = library.plan(node) else { continue };
+            let plans = surface.plans();
+            for node in (0..plans.len() as u32).map(|index| NodeId::unturned(index as usize)) {
+                let Plan::Split { step, .. } = plans.plan(node) else { continue };
                 if step.pole.is_none() {
                     continue;
                 }
                 n_poles += 1;
                 let at = |i: usize| Point::new((i as f64).sin(), (1.7 * i as f64).cos(), (0.3 * i as f64).sin());
-                let ring: Vec<Point> = (0..library.n_points(node)).map(at).collect();
+                let ring: Vec<Point> = (0..plans.n_points(node)).map(at).collect();
                 let mut expected = vec![Point::ZERO; step.rows.len()];
-                products(library.rows(), step.rows, &ring, &mut expected);
+                products(plans.rows(), step.rows, &ring, &mut expected);
                 let mut out = vec![Point::ZERO; step.rows.len()];
-                refined_points(library.rows(), step, &ring, &mut out);
+                refined_points(plans.rows(), step, &ring, &mut out);
                 for (a, b) in out.iter().zip(&expected) {
                     assert!((*a - *b).max_abs() < 1e-14, "valence {valence}: {a:?} {b:?}");
                 }
