@@ -31,7 +31,8 @@ pub fn for_each<T: Sync>(items: &[T], n_threads: usize, work: impl Fn(usize, &T)
     on_threads(n_threads.min(items.len()), worker);
 }
 
-fn on_threads(n_threads: usize, worker: impl Fn() + Sync) {
+/// Runs `worker` on `n_threads` threads, the caller's own among them.
+pub fn on_threads(n_threads: usize, worker: impl Fn() + Sync) {
     std::thread::scope(|scope| {
         for _ in 1..n_threads {
             scope.spawn(&worker);

@@ -3,6 +3,7 @@
 //! Face 0 is the target and half-edge 0 its first corner. Only the target's corners know all their faces (up to
 //! infinitely sharp edges, which nothing crosses); that is enough to refine the target and the rings of its quarters.
 
+use super::numbering::Numbering;
 use crate::topology::{Fan, HalfEdges, NONE, VertexTags, fan, fan_size};
 
 /// The ring of a target face.
@@ -241,76 +242,6 @@ pub fn extract_whole<M: HalfEdges + ?Sized>(
     walker.ring
 }
 
-/// Numbers for values, in the order in which they come first. It is cleared and filled again and again, so entries of its
-/// table count only with the stamp of the present filling.
-#[derive(Debug, Default)]
-struct Numbering {
-    values: Vec<u32>,
-    /// Stamps and numbers, at the hash of the value or in the next free place; twice as many as there are values, or more.
-    table: Vec<[u32; 2]>,
-    stamp: u32,
-}
-
-/// Room for the vertices of an ordinary ring.
-const LEAST_TABLE: usize = 64;
-
-impl Numbering {
-    fn clear(&mut self) {
-        self.values.clear();
-        self.stamp = self.stamp.wrapping_add(1);
-        if self.stamp == 0 || self.table.is_empty() {
-            self.make_table(LEAST_TABLE);
-        }
-    }
-
-    fn make_table(&mut self, len: usize) {
-        self.table.clear();
-        self.table.resize(len, [0; 2]);
-        self.stamp = 1;
-        for number in 0..self.values.len() {
-            let place = self.place(self.values[number]);
-            self.table[place] = [self.stamp, number as u32];
-        }
-    }
-
-    /// Where a value is, or would be.
-    #[inline(always)]
-    fn place(&self, value: u32) -> usize {
-        let mask = self.table.len() - 1;
-        let mut place = (value.wrapping_mul(0x9e37_79b9) >> 16) as usize & mask;
-        loop {
-            let [stamp, number] = self.table[place];
-            if stamp != self.stamp || self.values[number as usize] == value {
-                return place;
-            }
-            place = (place + 1) & mask;
-        }
-    }
-
-    #[inline(always)]
-    fn find(&self, value: u32) -> Option<u32> {
-        let [stamp, number] = self.table[self.place(value)];
-        (stamp == self.stamp).then_some(number)
-    }
-
-    /// The value's number, and whether it is new.
-    #[inline(always)]
-    fn number(&mut self, value: u32) -> (u32, bool) {
-        let place = self.place(value);
-        let [stamp, number] = self.table[place];
-        if stamp == self.stamp {
-            return (number, false);
-        }
-        let number = self.values.len() as u32;
-        self.values.push(value);
-        self.table[place] = [self.stamp, number];
-        if 2 * self.values.len() > self.table.len() {
-            self.make_table(2 * self.table.len());
-        }
-        (number, true)
-    }
-}
-
 /// What tells a corner of the target from others: equal for equal corners, and different for most others.
 #[derive(Clone, Copy, Default, Debug)]
 struct CornerSign {
@@ -365,6 +296,16 @@ fn least_turn(signs: &[CornerSign]) -> u32 {
         (corners.map(|c| c.layout), corners.map(|c| c.tags))
     };
     (1..4).fold(0, |best, t| if turned(t) < turned(best) { t } else { best }) as u32
+}
+
+/// The turn of a quad without tags at its corners, as its [`Look`] tells unless it is regular: from the sizes of the faces
+/// around each corner but itself, counter-clockwise.
+pub(super) fn turn_of_fans(fans: [impl Iterator<Item = u32>; 4]) -> u32 {
+    least_turn(&fans.map(|sizes| {
+        let mut sign = CornerSign::default();
+        sizes.for_each(|size| sign.add_face(size, false, 0.0));
+        sign
+    }))
 }
 
 /// A face seen by what lies around its corners.

@@ -3,6 +3,7 @@
 use super::bounds::GridBoxes;
 use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, sample_regular};
+use super::kinds::plan_faces;
 use super::local::RingWalker;
 use super::parts::Parts;
 use super::plan::{NodeId, PlanLibrary};
@@ -16,8 +17,7 @@ use crate::math::{DBounds, PointGrid};
 use crate::mesh::ControlMesh;
 use crate::topology::{FaceIndex, HalfEdges, Topology};
 use glam::DVec3;
-use parking_lot::RwLock;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The integer grid that tessellated vertices are rounded to: `object = center + step * lattice`.
 ///
@@ -60,10 +60,10 @@ impl Lattice {
 }
 
 /// The plan of a quad whose ring is 3 x 3 quads without any tag.
-const REGULAR: NodeId = NodeId(u32::MAX);
+pub(super) const REGULAR: NodeId = NodeId(u32::MAX);
 
 /// In place of the plan of a face under hierarchical edits.
-const EDITED: NodeId = NodeId(u32::MAX - 1);
+pub(super) const EDITED: NodeId = NodeId(u32::MAX - 1);
 
 /// A mesh whose limit surface can be evaluated.
 #[derive(Debug)]
@@ -429,64 +429,6 @@ fn regular_ring(topology: &Topology, first: u32) -> [u32; 16] {
         }
     }
     out
-}
-
-/// Faces a thread plans before it asks for more.
-const FACES_PER_TASK: usize = 512;
-
-/// The plan of every visible face. Node numbers depend on which thread comes first; what they mean does not.
-fn plan_faces(topology: &Topology, rules: RuleSet, n_threads: usize, sites: &EditSites) -> (PlanLibrary, Vec<NodeId>) {
-    let library = RwLock::new(PlanLibrary::new(rules));
-    let mut plans = vec![REGULAR; topology.n_faces()];
-    let tasks: Vec<_> = plans.chunks_mut(FACES_PER_TASK).enumerate().map(parking_lot::Mutex::new).collect();
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let (mut walker, mut key) = (RingWalker::default(), Vec::new());
-        while let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let (chunk, plans) = &mut *task.lock();
-            for (i, plan) in plans.iter_mut().enumerate() {
-                let face = FaceId::from(*chunk * FACES_PER_TASK + i);
-                *plan = if sites.contains(face) {
-                    EDITED
-                } else {
-                    plan_face(topology, &library, face, &mut walker, &mut key)
-                };
-            }
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..n_threads.min(tasks.len()) {
-            scope.spawn(work);
-        }
-        work();
-    });
-    drop(tasks);
-    (library.into_inner(), plans)
-}
-
-/// `walker` and `key` are scratch.
-fn plan_face(
-    topology: &Topology,
-    library: &RwLock<PlanLibrary>,
-    face: FaceId,
-    walker: &mut RingWalker,
-    key: &mut Vec<u32>,
-) -> NodeId {
-    if topology.is_hidden(face) {
-        return REGULAR;
-    }
-    let (first, _) = topology.face_corners(face.0);
-    let look = walker.look(topology, first);
-    if look.is_regular {
-        return REGULAR;
-    }
-    // One lock at a time: a second one would wait behind a writer that waits for the first.
-    let rules = library.read().rules();
-    let (outer_tags, lowers) = (rules.keeps_outer_tags(), rules.lowers());
-    let (steps, _) = walker.key(topology, first + look.turn, look, outer_tags, lowers, key);
-    let known = library.read().find(key, steps);
-    let make = || library.write().node(&walker.extract(topology, first + look.turn, outer_tags).mesh);
-    known.unwrap_or_else(make).turned(look.turn)
 }
 
 #[cfg(test)]

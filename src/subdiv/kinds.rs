@@ -1,0 +1,279 @@
+//! Which faces have equal rings, and so share a plan: found on all threads, before any plan is made.
+//!
+//! Most irregular faces are quads without any tag at their corners. The sizes of the faces around each corner, the corner's
+//! **fan**, tell all about their rings. Others are told apart by the keys of their rings.
+
+use super::edits::EditSites;
+use super::local::{RingWalker, turn_of_fans};
+use super::numbering::Numbering;
+use super::plan::{NodeId, PlanLibrary};
+use super::rules::RuleSet;
+use super::surface::{EDITED, REGULAR};
+use crate::ids::FaceId;
+use crate::parallel::{for_each, on_threads};
+use crate::topology::{HalfEdges, NONE, Topology};
+use parking_lot::Mutex;
+use rustc_hash::FxHashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Faces that a thread sorts before it asks for more.
+const FACES_PER_TASK: usize = 512;
+
+/// The sizes of the faces around a corner but the corner's own, counter-clockwise: 3 less in two bits each, below a bit that
+/// is set.
+type Fan = u64;
+
+/// The fan of four quads.
+const REGULAR_FAN: Fan = 0b1_01_01_01;
+
+/// The largest face that is told of in a fan, and the number of faces at most.
+const MOST_CORNERS: u32 = 6;
+const MOST_FACES: u32 = 31;
+
+/// The kinds of face that a thread has met.
+#[derive(Default)]
+struct Kinds {
+    by_fans: FxHashMap<[Fan; 4], u32>,
+    /// By the key of the ring, and by how many steps the ring is sharper.
+    by_key: FxHashMap<Vec<u32>, u32>,
+    /// The first face of each kind.
+    examples: Vec<Example>,
+    walker: RingWalker,
+    numbering: Numbering,
+    key: Vec<u32>,
+}
+
+/// A face of a kind.
+#[derive(Clone, Copy)]
+struct Example {
+    /// The half-edge where its ring starts.
+    start: u32,
+    /// Those of its corners from there on, if they tell its ring.
+    fans: Option<[Fan; 4]>,
+}
+
+/// Faces that follow each other. Of those that have one, the kind is in the place of the plan, as a node's number would be.
+struct Task<'a> {
+    first: usize,
+    plans: &'a mut [NodeId],
+    /// Whose [`Kinds`] they are.
+    thread: usize,
+}
+
+/// The plan of every visible face.
+pub(super) fn plan_faces(
+    topology: &Topology,
+    rules: RuleSet,
+    n_threads: usize,
+    sites: &EditSites,
+) -> (PlanLibrary, Vec<NodeId>) {
+    let mut library = PlanLibrary::new(rules);
+    let mut plans = vec![REGULAR; topology.n_faces()];
+    let chunks = plans.chunks_mut(FACES_PER_TASK).enumerate();
+    let tasks: Vec<_> =
+        chunks.map(|(i, plans)| Mutex::new(Task { first: i * FACES_PER_TASK, plans, thread: 0 })).collect();
+    let of_threads = sort_faces(topology, rules, n_threads, sites, &tasks);
+    let nodes = plan_kinds(topology, &mut library, &of_threads);
+    for_each(&tasks, n_threads, |_, task| {
+        let Task { plans, thread, .. } = &mut *task.lock();
+        for plan in plans.iter_mut().filter(|plan| ![REGULAR, EDITED].contains(plan)) {
+            *plan = nodes[*thread][(plan.0 >> 2) as usize].turned(plan.turn());
+        }
+    });
+    drop(tasks);
+    (library, plans)
+}
+
+/// Finds the kind of each face; returns the kinds of each thread.
+fn sort_faces(
+    topology: &Topology,
+    rules: RuleSet,
+    n_threads: usize,
+    sites: &EditSites,
+    tasks: &[Mutex<Task<'_>>],
+) -> Vec<Kinds> {
+    let next = AtomicUsize::new(0);
+    let of_threads = Mutex::new(Vec::new());
+    on_threads(n_threads.min(tasks.len()), || {
+        let mut kinds = Kinds::default();
+        let thread = {
+            let mut of_threads = of_threads.lock();
+            of_threads.push(Kinds::default());
+            of_threads.len() - 1
+        };
+        while let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let task = &mut *task.lock();
+            task.thread = thread;
+            for (face, plan) in (task.first..).map(FaceId::from).zip(task.plans.iter_mut()) {
+                *plan = if sites.contains(face) { EDITED } else { kinds.find(topology, rules, face) };
+            }
+        }
+        of_threads.lock()[thread] = kinds;
+    });
+    of_threads.into_inner()
+}
+
+/// The node of each kind of each thread. Nodes are made in the order of faces, whichever thread met them.
+fn plan_kinds(topology: &Topology, library: &mut PlanLibrary, of_threads: &[Kinds]) -> Vec<Vec<NodeId>> {
+    let mut nodes: Vec<Vec<NodeId>> = of_threads.iter().map(|kinds| vec![REGULAR; kinds.examples.len()]).collect();
+    let numbers = |(thread, kinds): (usize, &Kinds)| (0..kinds.examples.len()).map(move |kind| (thread, kind));
+    let mut all: Vec<(usize, usize)> = of_threads.iter().enumerate().flat_map(numbers).collect();
+    all.sort_unstable_by_key(|&(thread, kind)| of_threads[thread].examples[kind].start);
+    let mut by_fans: FxHashMap<[Fan; 4], NodeId> = FxHashMap::default();
+    let (mut walker, outer_tags) = (RingWalker::default(), library.outer_tags());
+    for (thread, kind) in all {
+        let Example { start, fans } = of_threads[thread].examples[kind];
+        let mut make = || library.node(&walker.extract(topology, start, outer_tags).mesh);
+        nodes[thread][kind] = match fans {
+            Some(fans) => *by_fans.entry(fans).or_insert_with(make),
+            None => make(),
+        };
+    }
+    nodes
+}
+
+impl Kinds {
+    /// The kind and the turn of a face, as of a node.
+    fn find(&mut self, topology: &Topology, rules: RuleSet, face: FaceId) -> NodeId {
+        if topology.is_hidden(face) {
+            return REGULAR;
+        }
+        let (first, _) = topology.face_corners(face.0);
+        match fans(topology, first) {
+            Some([REGULAR_FAN, REGULAR_FAN, REGULAR_FAN, REGULAR_FAN]) => REGULAR,
+            Some(fans) if is_spread_out(topology, first, &mut self.numbering) => self.by_fans(first, fans),
+            _ => self.by_key(topology, rules, first),
+        }
+    }
+
+    fn by_fans(&mut self, first: u32, mut fans: [Fan; 4]) -> NodeId {
+        let turn = turn_of_fans(fans.map(sizes));
+        fans.rotate_left(turn as usize);
+        let examples = &mut self.examples;
+        let kind = *self.by_fans.entry(fans).or_insert_with(|| {
+            examples.push(Example { start: first + turn, fans: Some(fans) });
+            examples.len() as u32 - 1
+        });
+        NodeId(kind << 2 | turn)
+    }
+
+    fn by_key(&mut self, topology: &Topology, rules: RuleSet, first: u32) -> NodeId {
+        let look = self.walker.look(topology, first);
+        if look.is_regular {
+            return REGULAR;
+        }
+        let (start, outer_tags) = (first + look.turn, rules.keeps_outer_tags());
+        let (steps, _) = self.walker.key(topology, start, look, outer_tags, rules.lowers(), &mut self.key);
+        self.key.push(steps);
+        let known = self.by_key.get(&self.key).copied();
+        let kind = known.unwrap_or_else(|| {
+            let kind = self.examples.len() as u32;
+            self.by_key.insert(self.key.clone(), kind);
+            self.examples.push(Example { start, fans: None });
+            kind
+        });
+        NodeId(kind << 2 | look.turn)
+    }
+}
+
+/// The fans of a quad, if they are closed, of three faces or more, and without tags.
+fn fans(topology: &Topology, first: u32) -> Option<[Fan; 4]> {
+    let is_plain_quad = topology.corners_at(first).1 == 4 && (first..first + 4).all(|h| topology.is_plain(h));
+    if !is_plain_quad {
+        return None;
+    }
+    let mut fans = [1; 4];
+    for (h, fan) in (first..).zip(&mut fans) {
+        let mut n = 1;
+        let mut spoke = turned(topology, h);
+        while spoke != h {
+            if spoke == NONE || n == MOST_FACES {
+                return None;
+            }
+            let (_, size) = topology.corners_at(spoke);
+            if size > MOST_CORNERS {
+                return None;
+            }
+            *fan = *fan << 2 | Fan::from(size - 3);
+            n += 1;
+            spoke = turned(topology, spoke);
+        }
+        if n < 3 {
+            return None;
+        }
+    }
+    Some(fans)
+}
+
+/// The sizes of a fan's faces.
+fn sizes(fan: Fan) -> impl Iterator<Item = u32> {
+    let n = fan.ilog2() / 2;
+    (0..n).rev().map(move |i| 3 + (fan >> (2 * i) & 3) as u32)
+}
+
+/// The half-edge that follows `spoke` counter-clockwise around the vertex where it starts.
+#[inline(always)]
+fn turned(topology: &Topology, spoke: u32) -> u32 {
+    topology.twin(topology.prev(spoke))
+}
+
+/// Whether all vertices of the ring of a quad with [`fans`] are different ones, but for those that faces side by side share.
+fn is_spread_out(topology: &Topology, first: u32, vertices: &mut Numbering) -> bool {
+    vertices.clear();
+    let mut is_new = |h: u32| vertices.number(topology.vertex(h)).1;
+    (first..first + 4).all(|h| {
+        let beside = turned(topology, h);
+        // The two faces beside the edges of the quad have vertices in common with the fans of the next corners: of each, the
+        // end of the edge from the corner is counted where that follows counter-clockwise, and in a triangle there only.
+        let mut is_counted = topology.corners_at(beside).1 == 3;
+        let mut spoke = turned(topology, beside);
+        let mut are_new = is_new(h);
+        while are_new && spoke != h {
+            let end = topology.next(spoke);
+            are_new = is_counted || is_new(end);
+            is_counted = false;
+            let next = turned(topology, spoke);
+            let n_shared = if next == h { 4 } else { 3 };
+            let mut inner = end;
+            for _ in n_shared..topology.corners_at(spoke).1 {
+                inner = topology.next(inner);
+                are_new = are_new && is_new(inner);
+            }
+            spoke = next;
+        }
+        are_new
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::random::random_mesh;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn faces_are_of_one_kind_if_their_rings_are_equal() {
+        let mut n_by_fans = 0;
+        for mesh in shapes::all().into_iter().map(|(_, mesh)| mesh).chain((0..100).map(random_mesh)) {
+            let topology = Topology::new(&mesh, 1);
+            let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
+            let sites = EditSites::new(&[], &topology);
+            let (_, plans) = plan_faces(&topology, rules, 3, &sites);
+            let (mut library, mut walker) = (PlanLibrary::new(rules), RingWalker::default());
+            let mut of_node = FxHashMap::default();
+            for (face, plan) in plans.iter().enumerate() {
+                let first = topology.face_corners(face as u32).0;
+                let look = walker.look(&topology, first);
+                assert_eq!(*plan == REGULAR, look.is_regular || topology.is_hidden(FaceId::from(face)));
+                if *plan == REGULAR {
+                    continue;
+                }
+                assert_eq!(plan.turn(), look.turn);
+                let node = library.node(&walker.extract(&topology, first + look.turn, rules.keeps_outer_tags()).mesh);
+                assert_eq!(*of_node.entry(node).or_insert(plan.turned(4 - look.turn)), plan.turned(4 - look.turn));
+                n_by_fans += u32::from(fans(&topology, first).is_some());
+            }
+        }
+        assert!(n_by_fans > 100, "{n_by_fans} faces have fans");
+    }
+}
