@@ -3,8 +3,9 @@
 //! Most irregular faces are quads without any tag at their corners. The sizes of the faces around each corner, the corner's
 //! **fan**, tell all about their rings. Others are told apart by the keys of their rings.
 
+use super::draft::Draft;
 use super::edits::EditSites;
-use super::local::{RingWalker, turn_of_fans};
+use super::local::{LocalMesh, RingWalker, turn_of_fans};
 use super::numbering::Numbering;
 use super::plan::{NodeId, PlanLibrary};
 use super::rules::RuleSet;
@@ -30,26 +31,30 @@ const REGULAR_FAN: Fan = 0b1_01_01_01;
 const MOST_CORNERS: u32 = 6;
 const MOST_FACES: u32 = 31;
 
+/// Kinds that are drafted before their nodes are made: drafts take more memory than nodes.
+const KINDS_PER_BATCH: usize = 1024;
+
+/// Kinds for which another thread is worth its start.
+const LEAST_KINDS: usize = 16;
+
 /// The kinds of face that a thread has met.
 #[derive(Default)]
 struct Kinds {
     by_fans: FxHashMap<[Fan; 4], u32>,
     /// By the key of the ring, and by how many steps the ring is sharper.
     by_key: FxHashMap<Vec<u32>, u32>,
-    /// The first face of each kind.
-    examples: Vec<Example>,
+    /// Where the ring of the first face of each kind starts.
+    examples: Vec<u32>,
     walker: RingWalker,
     numbering: Numbering,
     key: Vec<u32>,
 }
 
-/// A face of a kind.
-#[derive(Clone, Copy)]
-struct Example {
-    /// The half-edge where its ring starts.
-    start: u32,
-    /// Those of its corners from there on, if they tell its ring.
-    fans: Option<[Fan; 4]>,
+/// What tells a ring from others.
+#[derive(PartialEq, Eq, Hash)]
+enum Ring<'a> {
+    Fans(&'a [Fan; 4]),
+    Key(&'a [u32]),
 }
 
 /// Faces that follow each other. Of those that have one, the kind is in the place of the plan, as a node's number would be.
@@ -73,7 +78,7 @@ pub(super) fn plan_faces(
     let tasks: Vec<_> =
         chunks.map(|(i, plans)| Mutex::new(Task { first: i * FACES_PER_TASK, plans, thread: 0 })).collect();
     let of_threads = sort_faces(topology, rules, n_threads, sites, &tasks);
-    let nodes = plan_kinds(topology, &mut library, &of_threads);
+    let nodes = plan_kinds(topology, &mut library, &of_threads, n_threads);
     for_each(&tasks, n_threads, |_, task| {
         let Task { plans, thread, .. } = &mut *task.lock();
         for plan in plans.iter_mut().filter(|plan| ![REGULAR, EDITED].contains(plan)) {
@@ -114,22 +119,53 @@ fn sort_faces(
 }
 
 /// The node of each kind of each thread. Nodes are made in the order of faces, whichever thread met them.
-fn plan_kinds(topology: &Topology, library: &mut PlanLibrary, of_threads: &[Kinds]) -> Vec<Vec<NodeId>> {
-    let mut nodes: Vec<Vec<NodeId>> = of_threads.iter().map(|kinds| vec![REGULAR; kinds.examples.len()]).collect();
-    let numbers = |(thread, kinds): (usize, &Kinds)| (0..kinds.examples.len()).map(move |kind| (thread, kind));
-    let mut all: Vec<(usize, usize)> = of_threads.iter().enumerate().flat_map(numbers).collect();
-    all.sort_unstable_by_key(|&(thread, kind)| of_threads[thread].examples[kind].start);
-    let mut by_fans: FxHashMap<[Fan; 4], NodeId> = FxHashMap::default();
-    let (mut walker, outer_tags) = (RingWalker::default(), library.outer_tags());
-    for (thread, kind) in all {
-        let Example { start, fans } = of_threads[thread].examples[kind];
-        let mut make = || library.node(&walker.extract(topology, start, outer_tags).mesh);
-        nodes[thread][kind] = match fans {
-            Some(fans) => *by_fans.entry(fans).or_insert_with(make),
-            None => make(),
-        };
+fn plan_kinds(
+    topology: &Topology,
+    library: &mut PlanLibrary,
+    of_threads: &[Kinds],
+    n_threads: usize,
+) -> Vec<Vec<NodeId>> {
+    let (kinds, examples) = joined(of_threads);
+    let nodes: Vec<NodeId> =
+        examples.chunks(KINDS_PER_BATCH).flat_map(|starts| plan_batch(topology, library, starts, n_threads)).collect();
+    kinds.iter().map(|kinds| kinds.iter().map(|&kind| nodes[kind]).collect()).collect()
+}
+
+/// Numbers for the kinds of all threads, and where the ring of the first face of each starts.
+fn joined(of_threads: &[Kinds]) -> (Vec<Vec<usize>>, Vec<u32>) {
+    let mut numbers: Vec<Vec<usize>> = of_threads.iter().map(|kinds| vec![0; kinds.examples.len()]).collect();
+    let mut all: Vec<(usize, u32, Ring<'_>)> = Vec::new();
+    for (thread, kinds) in of_threads.iter().enumerate() {
+        all.extend(kinds.by_fans.iter().map(|(fans, &kind)| (thread, kind, Ring::Fans(fans))));
+        all.extend(kinds.by_key.iter().map(|(key, &kind)| (thread, kind, Ring::Key(key))));
     }
-    nodes
+    all.sort_unstable_by_key(|&(thread, kind, _)| of_threads[thread].examples[kind as usize]);
+    let (mut known, mut examples) = (FxHashMap::default(), Vec::new());
+    for (thread, kind, ring) in all {
+        numbers[thread][kind as usize] = *known.entry(ring).or_insert_with(|| {
+            examples.push(of_threads[thread].examples[kind as usize]);
+            examples.len() - 1
+        });
+    }
+    (numbers, examples)
+}
+
+/// The nodes of the rings that start at these half-edges. All threads make drafts, one after the other becomes a node.
+fn plan_batch(topology: &Topology, library: &mut PlanLibrary, starts: &[u32], n_threads: usize) -> Vec<NodeId> {
+    let (rules, next) = (library.rules(), AtomicUsize::new(0));
+    let drafts: Vec<Mutex<Option<(LocalMesh, Draft)>>> = starts.iter().map(|_| Mutex::default()).collect();
+    on_threads(n_threads.min(starts.len().div_ceil(LEAST_KINDS)), || {
+        let (mut walker, mut of_quarters) = (RingWalker::default(), RingWalker::default());
+        loop {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&start) = starts.get(i) else { break };
+            let ring = walker.extract(topology, start, rules.keeps_outer_tags()).mesh.clone();
+            let draft = Draft::new(rules, &ring, false, &mut of_quarters);
+            *drafts[i].lock() = Some((ring, draft));
+        }
+    });
+    let drafts = drafts.into_iter().map(|draft| draft.into_inner().expect("every kind was drafted"));
+    drafts.map(|(ring, draft)| library.drafted_node(ring, Some(draft))).collect()
 }
 
 impl Kinds {
@@ -151,7 +187,7 @@ impl Kinds {
         fans.rotate_left(turn as usize);
         let examples = &mut self.examples;
         let kind = *self.by_fans.entry(fans).or_insert_with(|| {
-            examples.push(Example { start: first + turn, fans: Some(fans) });
+            examples.push(first + turn);
             examples.len() as u32 - 1
         });
         NodeId(kind << 2 | turn)
@@ -169,7 +205,7 @@ impl Kinds {
         let kind = known.unwrap_or_else(|| {
             let kind = self.examples.len() as u32;
             self.by_key.insert(self.key.clone(), kind);
-            self.examples.push(Example { start, fans: None });
+            self.examples.push(start);
             kind
         });
         NodeId(kind << 2 | look.turn)

@@ -112,12 +112,13 @@ impl LocalMesh {
     /// What is semi-sharp, at corners and at edges that touch them.
     fn semi_sharp(&mut self) -> impl Iterator<Item = &mut f32> {
         let tags = self.tags.iter_mut().flat_map(|tags| tags.semi_sharp.iter_mut().chain([&mut tags.sharpness]));
-        tags.chain(&mut self.sharpness).filter(|s| **s > 0.0 && s.is_finite())
+        tags.chain(&mut self.sharpness).filter(|s| is_semi_sharp(**s))
     }
 
     /// The least of all that is semi-sharp; infinite if nothing is.
-    pub fn least_semi_sharp(&mut self) -> f32 {
-        self.semi_sharp().fold(f32::INFINITY, |least, s| least.min(*s))
+    pub fn least_semi_sharp(&self) -> f32 {
+        let tags = self.tags.iter().flat_map(|tags| tags.semi_sharp.iter().chain([&tags.sharpness]));
+        tags.chain(&self.sharpness).filter(|s| is_semi_sharp(**s)).fold(f32::INFINITY, |least, s| least.min(*s))
     }
 
     /// Makes all that is semi-sharp less so, by as many steps of the uniform method as leave the least of it above 1. Returns
@@ -258,10 +259,13 @@ fn add_word(hash: &mut u64, word: u32) {
     *hash = (hash.rotate_left(5) ^ u64::from(word)).wrapping_mul(0x517c_c1b7_2722_0a95);
 }
 
+fn is_semi_sharp(sharpness: f32) -> bool {
+    sharpness > 0.0 && sharpness.is_finite()
+}
+
 /// What whole steps do not change of sharpness, as a word: rings on the way to smoothness are turned alike.
 fn fraction_bits(sharpness: f32) -> u32 {
-    let is_semi_sharp = sharpness > 0.0 && sharpness.is_finite();
-    if is_semi_sharp { (2.0 - sharpness.ceil() + sharpness).to_bits() } else { sharpness.to_bits() }
+    if is_semi_sharp(sharpness) { (2.0 - sharpness.ceil() + sharpness).to_bits() } else { sharpness.to_bits() }
 }
 
 impl CornerSign {

@@ -28,6 +28,7 @@
 
 mod bounds;
 pub mod dice;
+mod draft;
 pub mod edits;
 pub mod eval;
 mod kinds;

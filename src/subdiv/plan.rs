@@ -1,10 +1,10 @@
 //! The plan library: one node per distinct ring, shared by all faces, levels and meshes with the same rules.
 
+use super::draft::{Draft, Quarter, SplitDraft};
 use super::local::{LocalMesh, RingWalker};
-use super::pole::Pole;
 use super::route::route;
 use super::rows::{RowStore, Span, SparseRows};
-use super::rules::{self, CornerLimit, Origin, RefinedView, Row, RuleSet};
+use super::rules::{self, CornerLimit, RefinedView, Row, RuleSet};
 use crate::mesh::CreaseMethod;
 use crate::topology::NONE;
 use rustc_hash::FxHashMap;
@@ -186,6 +186,8 @@ struct Node {
     /// Where its limits start, four if there are four children.
     limits: u32,
     in_hull: bool,
+    /// Whether it is regular, and its control points are points of its ring.
+    is_listed: bool,
 }
 
 impl Default for Node {
@@ -202,6 +204,7 @@ impl Default for Node {
             ready: 0,
             limits: 0,
             in_hull: true,
+            is_listed: false,
         }
     }
 }
@@ -316,39 +319,37 @@ impl PlanLibrary {
         self.limits.shrink_to_fit();
     }
 
-    /// The node for a ring that is so many steps sharper than the one with this key, if it is known.
-    pub fn find(&self, key: &[u32], steps: u32) -> Option<NodeId> {
-        let id = self.by_key.get(key)?.sharper(steps);
-        let is_ready = id.0 & IS_SHARP == 0 || self.nodes[id.index()].ready >> id.steps() & 1 == 1;
-        is_ready.then_some(id)
-    }
-
     /// The node for a ring, made if it is new.
     pub fn node(&mut self, ring: &LocalMesh) -> NodeId {
-        let mut ring = ring.clone();
-        let steps = if self.lowers() { ring.lower() } else { 0 };
-        self.node_above(&mut ring, steps)
+        self.drafted_node(ring.clone(), None)
     }
 
-    /// The node for a ring that is so many steps sharper than this one, made if it is new.
-    fn node_above(&mut self, ring: &mut LocalMesh, steps: u32) -> NodeId {
+    /// As [`node`](Self::node); `draft` is the ring's, if it is there already.
+    pub(super) fn drafted_node(&mut self, mut ring: LocalMesh, draft: Option<Draft>) -> NodeId {
+        let steps = if self.lowers() { ring.lower() } else { 0 };
+        self.node_above(&mut ring, steps, draft)
+    }
+
+    /// The node for a ring that is so many steps sharper than this one, made if it is new. The draft is of the sharper one.
+    fn node_above(&mut self, ring: &mut LocalMesh, steps: u32, draft: Option<Draft>) -> NodeId {
         let mut key = std::mem::take(&mut self.key);
         ring.key(&mut key);
-        let id = self.by_key.get(&key).copied();
-        let id = id.unwrap_or_else(|| self.make_node(ring, &key)).sharper(steps);
+        let (id, draft) = match self.by_key.get(&key) {
+            Some(&id) => (id, draft),
+            None => self.make_node(ring, &key, draft),
+        };
         self.key = key;
-        if id.0 & IS_SHARP != 0 && self.nodes[id.index()].ready >> steps & 1 == 0 {
-            self.nodes[id.index()].ready |= 1 << steps;
-            ring.raise(steps);
-            self.split_sharp(id, ring);
+        let id = id.sharper(steps);
+        if !self.settle(id) {
+            self.make_ready(id, ring, draft);
         }
         id
     }
 
-    /// The node for a ring that is new. What is below it is not known yet if others can be sharper by some steps.
-    fn make_node(&mut self, ring: &mut LocalMesh, key: &[u32]) -> NodeId {
-        let least = ring.least_semi_sharp();
-        let is_sharp = self.lowers() && least > 1.0 && least.is_finite();
+    /// The node for a ring that is new, and its draft unless it was used. What is below it is not known yet if others can be
+    /// sharper by some steps.
+    fn make_node(&mut self, ring: &mut LocalMesh, key: &[u32], draft: Option<Draft>) -> (NodeId, Option<Draft>) {
+        let is_sharp = self.rules.shares_sharper(ring);
         let id = NodeId(NodeId::unturned(self.nodes.len()).0 | if is_sharp { IS_SHARP } else { 0 });
         let nothing = self.rows.push([]);
         let n_points = ring.n_vertices() as u32;
@@ -357,48 +358,75 @@ impl PlanLibrary {
         self.nodes.push(node);
         self.by_key.insert(key.to_vec(), id);
         if is_sharp {
-            return id;
+            return (id, draft);
         }
-        let regular = if ring.n_corners() == 4 { rules::regular_rows(ring) } else { None };
-        match regular {
-            Some(rows) => {
-                self.nodes[id.index()].rows = self.rows.push(rows.iter().flatten());
-                self.nodes[id.index()].n_children = 0;
+        match draft.unwrap_or_else(|| Draft::new(self.rules, ring, false, &mut self.walker)) {
+            Draft::Regular(rows) => {
+                let node = &mut self.nodes[id.index()];
+                (node.rows, node.n_children) = (self.rows.push(rows.iter().flatten()), 0);
+                node.is_listed = rows.iter().flatten().all(|row| matches!(row[..], [(_, 1.0)]));
             }
-            None => self.split(id, ring),
+            Draft::Split(draft) => self.split(id, ring, draft),
         }
-        id
+        (id, None)
     }
 
-    fn split(&mut self, id: NodeId, ring: &LocalMesh) {
-        let n = ring.n_corners();
-        let refined = RefinedView::new(self.rules, ring);
-        let (mut rows, pole) = RefinedRows::new(self.rules, ring, &refined);
-        let quarters = self.quarters(&refined, n, &mut rows);
-        let rows = self.rows.push(&rows.rows);
-        if !pole.is_empty() {
-            let shape = self.rows.push_indices(&[&pole[..], &route(ring)].concat());
+    fn split(&mut self, id: NodeId, ring: &LocalMesh, draft: SplitDraft) {
+        let rows = self.rows.push(&draft.rows);
+        if !draft.pole.is_empty() {
+            let shape = self.rows.push_indices(&[&draft.pole[..], &route(ring)].concat());
             let node = &mut self.nodes[id.index()];
-            (node.shape, node.n_pole) = (shape, pole.len() as u32);
+            (node.shape, node.n_pole) = (shape, draft.pole.len() as u32);
         }
-        let children: Vec<Child> = quarters.into_iter().map(|quarter| self.child(quarter)).collect();
-        self.finish(id, ring, rows, &children);
+        let (children, rings) = self.children_of(ring, &draft.quarters);
+        self.finish(id, ring, rows, &children, draft.limits);
         self.nodes[id.index()].children = self.children.len() as u32;
-        self.children.extend(children);
+        self.children.extend(&children);
+        self.make_children_ready(ring, &draft.quarters, &children, rings);
+    }
+
+    /// Whether a node is one that rings which are as sharp can use: all below it is known. What is true of the children is true
+    /// of it.
+    fn settle(&mut self, id: NodeId) -> bool {
+        if id.0 & IS_SHARP == 0 || self.nodes[id.index()].ready >> id.steps() & 1 == 1 {
+            return true;
+        }
+        let node = self.nodes[id.index()];
+        let (start, above) = if id.steps() == 0 { (node.children, 0) } else { (node.sharper, id.steps() - 1) };
+        let is_settled = start != NONE
+            && (start..start + node.n_children).all(|child| {
+                let child = self.children[child as usize].node;
+                self.settle(child.sharper(above))
+            });
+        self.nodes[id.index()].ready |= u16::from(is_settled) << id.steps();
+        is_settled
+    }
+
+    /// Finds what is below a node that is not settled. `ring` is that of the node, and becomes the sharper one.
+    fn make_ready(&mut self, id: NodeId, ring: &mut LocalMesh, draft: Option<Draft>) {
+        let Node { children, sharper, .. } = self.nodes[id.index()];
+        if id.steps() > 0 && sharper != NONE && children == NONE {
+            // The way down from here ends at the node itself, most often: then its own ring is all that has to be split.
+            self.split_sharp(id.less_sharp(id.steps()), ring, None);
+            if self.settle(id) {
+                return;
+            }
+        }
+        ring.raise(id.steps());
+        self.split_sharp(id, ring, draft);
     }
 
     /// Finds what is below a ring whose node can be that of sharper ones, too. The first of them gives the node its rows: all
     /// have the same.
-    fn split_sharp(&mut self, id: NodeId, ring: &LocalMesh) {
-        let refined = RefinedView::new(self.rules, ring);
-        let (mut rows, _) = RefinedRows::new(self.rules, ring, &refined);
-        let is_first = self.nodes[id.index()].ready.count_ones() == 1;
-        rows.is_dry = !is_first;
-        let quarters = self.quarters(&refined, ring.n_corners(), &mut rows);
-        let rows = is_first.then(|| self.rows.push(&rows.rows));
-        let children: Vec<Child> = quarters.into_iter().map(|quarter| self.child(quarter)).collect();
+    fn split_sharp(&mut self, id: NodeId, ring: &LocalMesh, draft: Option<Draft>) {
+        let is_first = self.nodes[id.index()].ready == 0;
+        self.nodes[id.index()].ready |= 1 << id.steps();
+        let draft = draft.unwrap_or_else(|| Draft::new(self.rules, ring, !is_first, &mut self.walker));
+        let Draft::Split(draft) = draft else { unreachable!("nothing that is sharp is regular") };
+        let rows = is_first.then(|| self.rows.push(&draft.rows));
+        let (children, rings) = self.children_of(ring, &draft.quarters);
         if let Some(rows) = rows {
-            self.finish(id, ring, rows, &children);
+            self.finish(id, ring, rows, &children, draft.limits);
         }
         let node = &mut self.nodes[id.index()];
         let (start, above) = match id.steps() {
@@ -409,13 +437,14 @@ impl PlanLibrary {
             *start = self.children.len() as u32;
             self.children.extend(children.iter().map(|c| Child { node: c.node.less_sharp(above), ..*c }));
         }
+        self.make_children_ready(ring, &draft.quarters, &children, rings);
     }
 
     /// Gives a node all but its children.
-    fn finish(&mut self, id: NodeId, ring: &LocalMesh, rows: SparseRows, children: &[Child]) {
+    fn finish(&mut self, id: NodeId, ring: &LocalMesh, rows: SparseRows, children: &[Child], limits: Vec<CornerLimit>) {
         let n = ring.n_corners();
-        let n_limits = if n == 4 { 4 } else { 0 };
-        let limits: Vec<Limit> = (0..n_limits).map(|k| self.limit(id, ring, rows, &children[k as usize], k)).collect();
+        let limits: Vec<Limit> =
+            (0..).zip(limits).map(|(k, limit)| self.limit(id, ring, rows, &children[k as usize], k, limit)).collect();
         // Those of other vertices count only for edges to such corners.
         let semi_sharp = (0..n).any(|k| !ring.tags_at(k).semi_sharp.is_empty());
         let node = &mut self.nodes[id.index()];
@@ -425,21 +454,57 @@ impl PlanLibrary {
         self.limits.extend(limits);
     }
 
-    fn child(&mut self, quarter: Quarter) -> Child {
-        let Quarter { node, steps, turn, points } = quarter;
-        let node = node.unwrap_or_else(|mut ring| self.node_above(&mut ring, steps)).turned(turn);
-        self.plain_child(node, &points).unwrap_or_else(|| Child { node, points: self.rows.push_indices(&points) })
+    /// The children of a ring, made if they are new, but not ready if they are shared by sharper rings; and those of their rings
+    /// that were cut out for that.
+    fn children_of(&mut self, ring: &LocalMesh, quarters: &[Quarter]) -> (Vec<Child>, Vec<Option<LocalMesh>>) {
+        let mut refined = None;
+        let child = |quarter: &Quarter| {
+            let (mut cut_out, key) = (None, &quarter.key);
+            let node = self.by_key.get(key).copied().unwrap_or_else(|| {
+                let refined = refined.get_or_insert_with(|| RefinedView::new(self.rules, ring));
+                let ring = cut_out.insert(self.cut_out(refined, quarter));
+                self.make_node(ring, key, None).0
+            });
+            let (node, points) = (node.sharper(quarter.steps).turned(quarter.turn), &quarter.points);
+            let plain = self.plain_child(node, points);
+            (plain.unwrap_or_else(|| Child { node, points: self.rows.push_indices(points) }), cut_out)
+        };
+        quarters.iter().map(child).unzip()
+    }
+
+    /// The ring of a quarter, made less sharp.
+    fn cut_out(&mut self, refined: &RefinedView<'_>, quarter: &Quarter) -> LocalMesh {
+        let outer_tags = self.outer_tags();
+        let mut ring = self.walker.extract(refined, quarter.start, outer_tags).mesh.clone();
+        if self.lowers() {
+            ring.lower();
+        }
+        ring
+    }
+
+    /// Finds what is below children that are not settled.
+    fn make_children_ready(
+        &mut self,
+        ring: &LocalMesh,
+        quarters: &[Quarter],
+        children: &[Child],
+        rings: Vec<Option<LocalMesh>>,
+    ) {
+        let mut refined = None;
+        for ((quarter, child), cut_out) in quarters.iter().zip(children).zip(rings) {
+            if !self.settle(child.node) {
+                let refined = refined.get_or_insert_with(|| RefinedView::new(self.rules, ring));
+                let mut ring = cut_out.unwrap_or_else(|| self.cut_out(refined, quarter));
+                self.make_ready(child.node.turned(4 - quarter.turn), &mut ring, None);
+            }
+        }
     }
 
     /// The child at a regular node whose control points are points of its ring: those are all the points it has then.
     fn plain_child(&mut self, node: NodeId, points: &[u32]) -> Option<Child> {
-        let (Node { rows, n_children: 0, .. }, turn) = (self.nodes[node.index()], node.turn()) else { return None };
-        let row = |i: usize| self.rows.row(rows, i);
-        let is_plain = (0..rows.len()).all(|i| matches!(row(i)[..], [(_, 1.0)]));
-        if !is_plain || rows.is_empty() {
-            return None;
-        }
-        let control = TURNED_CONTROL[turn as usize].map(|i| points[row(i.into())[0].0 as usize]);
+        let Node { rows, n_children: 0, is_listed: true, .. } = self.nodes[node.index()] else { return None };
+        let point = |i: u8| points[self.rows.first_column(rows, i.into())];
+        let control = TURNED_CONTROL[node.turn() as usize].map(point);
         let points = self.rows.push_indices(&control);
         let node = self.plain.unwrap_or_else(|| self.push_plain());
         self.plain = Some(node);
@@ -453,33 +518,16 @@ impl PlanLibrary {
         id
     }
 
-    /// Each quarter of a ring: its node, or its ring if that is new, and its points in terms of `rows`, which become more by
-    /// those that are not there yet.
-    fn quarters(&mut self, refined: &RefinedView<'_>, n: u32, rows: &mut RefinedRows<'_>) -> Vec<Quarter> {
-        let (mut walker, mut key) = (std::mem::take(&mut self.walker), Vec::new());
-        let quarters = (0..n).map(|k| {
-            let start = child_start(n, k);
-            let look = walker.look(refined, start);
-            let turned = start & !3 | (start + look.turn) & 3;
-            let (steps, sources) = walker.key(refined, turned, look, self.outer_tags(), self.lowers(), &mut key);
-            let points = sources.iter().map(|&v| rows.place_of(refined, v)).collect();
-            let node = self.find(&key, steps).ok_or_else(|| {
-                walker.extract(refined, turned, self.outer_tags());
-                let mut ring = walker.take().mesh;
-                if self.lowers() {
-                    ring.lower();
-                }
-                ring
-            });
-            Quarter { node, steps, turn: look.turn, points }
-        });
-        let quarters = quarters.collect();
-        self.walker = walker;
-        quarters
-    }
-
-    fn limit(&mut self, id: NodeId, ring: &LocalMesh, rows: SparseRows, child: &Child, k: u32) -> Limit {
-        match rules::corner_limit(ring, k) {
+    fn limit(
+        &mut self,
+        id: NodeId,
+        ring: &LocalMesh,
+        rows: SparseRows,
+        child: &Child,
+        k: u32,
+        limit: CornerLimit,
+    ) -> Limit {
+        match limit {
             CornerLimit::Regular => Limit::Regular,
             CornerLimit::Position(row) => Limit::Position(self.rows.push([&row])),
             CornerLimit::Smooth(position, [along, next]) => {
@@ -555,71 +603,3 @@ pub(super) const TURNED_CONTROL: [[u8; 16]; 4] = [
     [15, 14, 13, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1, 0],
     [3, 7, 11, 15, 2, 6, 10, 14, 1, 5, 9, 13, 0, 4, 8, 12],
 ];
-
-/// A quarter that is becoming a child.
-struct Quarter {
-    /// Its node, or the ring for which that is made, if it is new.
-    node: Result<NodeId, LocalMesh>,
-    /// How many steps sharper it is than that ring.
-    steps: u32,
-    /// See [`NodeId::turn`].
-    turn: u32,
-    points: Vec<u32>,
-}
-
-/// The rows of a ring's refined points, each made when it is first asked for.
-struct RefinedRows<'a> {
-    rules: RuleSet,
-    ring: &'a LocalMesh,
-    /// For each refined point its row, or [`NONE`].
-    place: Vec<u32>,
-    rows: Vec<Row>,
-    /// Whether rows are only counted.
-    is_dry: bool,
-}
-
-impl<'a> RefinedRows<'a> {
-    /// With the face point, if the target is a polygon, or all of a pole's, with the ring in a pole's order.
-    fn new(rules: RuleSet, ring: &'a LocalMesh, refined: &RefinedView<'_>) -> (Self, Vec<u32>) {
-        let mut rows =
-            RefinedRows { rules, ring, place: vec![NONE; refined.origin.len()], rows: Vec::new(), is_dry: false };
-        if ring.n_corners() != 4 {
-            rows.place_of(refined, refined.face_vertex(0));
-        }
-        if let Some(pole) = Pole::new(ring)
-            && let Some(points) = pole.refined(refined)
-        {
-            points.into_iter().for_each(|v| _ = rows.place_of(refined, v));
-            return (rows, pole.ring());
-        }
-        (rows, Vec::new())
-    }
-
-    fn place_of(&mut self, refined: &RefinedView<'_>, v: u32) -> u32 {
-        let place = &mut self.place[v as usize];
-        if *place == NONE {
-            *place = self.rows.len() as u32;
-            let origin = corner_origin(self.ring, refined.origin[v as usize]);
-            let row = if self.is_dry { Row::new() } else { rules::refined_row(&self.rules, self.ring, origin) };
-            self.rows.push(row);
-        }
-        *place
-    }
-}
-
-/// Child `k`'s first half-edge in the refined ring: quarters of quads are turned so that their corner k is the face's.
-pub(super) fn child_start(n_corners: u32, k: u32) -> u32 {
-    if n_corners == 4 { 4 * k + (4 - k) % 4 } else { 4 * k }
-}
-
-/// Vertex rows are asked by a corner of the target: any other spoke would see another fan.
-fn corner_origin(ring: &LocalMesh, origin: Origin) -> Origin {
-    match origin {
-        Origin::Vertex(h) => {
-            let v = ring.vertex[h as usize];
-            let corner = (0..ring.n_corners()).find(|&k| ring.vertex[k as usize] == v);
-            Origin::Vertex(corner.expect("children use the points of the target's corners only"))
-        }
-        other => other,
-    }
-}

@@ -285,6 +285,11 @@ impl RowStore {
         })
     }
 
+    /// The first column of row `i` of some rows.
+    pub fn first_column(&self, rows: SparseRows, i: usize) -> usize {
+        with_rows!(self, rows, |view, _indices| view.row(i).0[0].idx())
+    }
+
     /// Index `i` of a list.
     #[inline(always)]
     pub fn index(&self, list: Span, i: usize) -> usize {

@@ -30,6 +30,12 @@ impl RuleSet {
     pub fn lowers(&self) -> bool {
         self.crease_method == CreaseMethod::Uniform
     }
+
+    /// Whether the node of a ring is also that of rings which are sharper by whole steps. Such a node is split, always.
+    pub fn shares_sharper(&self, ring: &LocalMesh) -> bool {
+        let least = ring.least_semi_sharp();
+        self.lowers() && least > 1.0 && least.is_finite()
+    }
 }
 
 /// Weight of each face point for an edge beside a triangle, with smooth triangles (OpenSubdiv).

@@ -3,9 +3,9 @@
 use super::trie::{EditTrie, TrieId};
 use crate::ids::FaceId;
 use crate::mesh::{Edit, EditKind, EditValue};
+use crate::subdiv::draft::child_start;
 use crate::subdiv::eval::Point;
 use crate::subdiv::local::{Extracted, LocalMesh, extract_whole};
-use crate::subdiv::plan::child_start;
 use crate::subdiv::rules::{self, Origin, Refined, Row, RuleSet};
 use crate::subdiv::surface::Lattice;
 use crate::topology::{HalfEdges, NONE, Topology};
