@@ -77,7 +77,8 @@ pub(super) fn plan_faces(
     let chunks = plans.chunks_mut(FACES_PER_TASK).enumerate();
     let tasks: Vec<_> =
         chunks.map(|(i, plans)| Mutex::new(Task { first: i * FACES_PER_TASK, plans, thread: 0 })).collect();
-    let of_threads = sort_faces(topology, rules, n_threads, sites, &tasks);
+    let sorter = Sorter { topology, rules, sites, valences: &valences(topology) };
+    let of_threads = sort_faces(&sorter, n_threads, &tasks);
     let nodes = plan_kinds(topology, &mut library, &of_threads, n_threads);
     for_each(&tasks, n_threads, |_, task| {
         let Task { plans, thread, .. } = &mut *task.lock();
@@ -89,14 +90,17 @@ pub(super) fn plan_faces(
     (library, plans)
 }
 
-/// Finds the kind of each face; returns the kinds of each thread.
-fn sort_faces(
-    topology: &Topology,
+/// What faces are sorted by.
+struct Sorter<'a> {
+    topology: &'a Topology,
     rules: RuleSet,
-    n_threads: usize,
-    sites: &EditSites,
-    tasks: &[Mutex<Task<'_>>],
-) -> Vec<Kinds> {
+    sites: &'a EditSites,
+    /// See [`valences`].
+    valences: &'a [u8],
+}
+
+/// Finds the kind of each face; returns the kinds of each thread.
+fn sort_faces(sorter: &Sorter<'_>, n_threads: usize, tasks: &[Mutex<Task<'_>>]) -> Vec<Kinds> {
     let next = AtomicUsize::new(0);
     let of_threads = Mutex::new(Vec::new());
     on_threads(n_threads.min(tasks.len()), || {
@@ -110,7 +114,7 @@ fn sort_faces(
             let task = &mut *task.lock();
             task.thread = thread;
             for (face, plan) in (task.first..).map(FaceId::from).zip(task.plans.iter_mut()) {
-                *plan = if sites.contains(face) { EDITED } else { kinds.find(topology, rules, face) };
+                *plan = if sorter.sites.contains(face) { EDITED } else { kinds.find(sorter, face) };
             }
         }
         of_threads.lock()[thread] = kinds;
@@ -170,15 +174,17 @@ fn plan_batch(topology: &Topology, library: &mut PlanLibrary, starts: &[u32], n_
 
 impl Kinds {
     /// The kind and the turn of a face, as of a node.
-    fn find(&mut self, topology: &Topology, rules: RuleSet, face: FaceId) -> NodeId {
+    fn find(&mut self, sorter: &Sorter<'_>, face: FaceId) -> NodeId {
+        let topology = sorter.topology;
         if topology.is_hidden(face) {
             return REGULAR;
         }
-        let (first, _) = topology.face_corners(face.0);
-        match fans(topology, first) {
+        let (first, n) = topology.face_corners(face.0);
+        let fans = if n == 4 { sorter.fans(first) } else { None };
+        match fans {
             Some([REGULAR_FAN, REGULAR_FAN, REGULAR_FAN, REGULAR_FAN]) => REGULAR,
             Some(fans) if is_spread_out(topology, first, &mut self.numbering) => self.by_fans(first, fans),
-            _ => self.by_key(topology, rules, first),
+            _ => self.by_key(topology, sorter.rules, first),
         }
     }
 
@@ -212,33 +218,62 @@ impl Kinds {
     }
 }
 
-/// The fans of a quad, if they are closed, of three faces or more, and without tags.
-fn fans(topology: &Topology, first: u32) -> Option<[Fan; 4]> {
-    let is_plain_quad = topology.corners_at(first).1 == 4 && (first..first + 4).all(|h| topology.is_plain(h));
-    if !is_plain_quad {
+/// The numbers of edges at vertices that have quads only around them and no tag, from 3 to [`MOST_FACES`]; 0 for others.
+fn valences(topology: &Topology) -> Vec<u8> {
+    let mut valences = vec![0u8; topology.n_vertices()];
+    for face in 0..topology.n_faces() as u32 {
+        let (first, n) = topology.face_corners(face);
+        for h in first..first + n {
+            let v = topology.vertex(h) as usize;
+            let is_other = n != 4 || topology.twin(h) == NONE || topology.is_tagged(v as u32);
+            valences[v] = if is_other { u8::MAX } else { valences[v].saturating_add(1) };
+        }
+    }
+    let in_range = 3..=MOST_FACES as u8;
+    valences.iter_mut().filter(|n| !in_range.contains(n)).for_each(|n| *n = 0);
+    valences
+}
+
+impl Sorter<'_> {
+    /// The fans of a quad, if they are closed, of three faces or more, and without tags.
+    fn fans(&self, first: u32) -> Option<[Fan; 4]> {
+        let mut fans = [0; 4];
+        for (h, fan) in (first..).zip(&mut fans) {
+            *fan = match self.valences[self.topology.vertex(h) as usize] {
+                0 => fan_at(self.topology, h)?,
+                n => fan_of_quads(n),
+            };
+        }
+        Some(fans)
+    }
+}
+
+fn fan_of_quads(n: u8) -> Fan {
+    const MOST: Fan = 0x5555_5555_5555_5555;
+    let below = (1 << (2 * (n - 1))) - 1;
+    1 << (2 * (n - 1)) | MOST & below
+}
+
+/// The fan of a corner, if it is closed, of three faces or more, and without tags.
+fn fan_at(topology: &Topology, h: u32) -> Option<Fan> {
+    if !topology.is_plain(h) {
         return None;
     }
-    let mut fans = [1; 4];
-    for (h, fan) in (first..).zip(&mut fans) {
-        let mut n = 1;
-        let mut spoke = turned(topology, h);
-        while spoke != h {
-            if spoke == NONE || n == MOST_FACES {
-                return None;
-            }
-            let (_, size) = topology.corners_at(spoke);
-            if size > MOST_CORNERS {
-                return None;
-            }
-            *fan = *fan << 2 | Fan::from(size - 3);
-            n += 1;
-            spoke = turned(topology, spoke);
-        }
-        if n < 3 {
+    let (mut fan, mut n) = (1, 1);
+    let mut spoke = turned(topology, h);
+    while spoke != h {
+        if spoke == NONE || n == MOST_FACES {
             return None;
         }
+        let (_, size) = topology.corners_at(spoke);
+        if size > MOST_CORNERS {
+            return None;
+        }
+        fan = fan << 2 | Fan::from(size - 3);
+        n += 1;
+        spoke = turned(topology, spoke);
     }
-    Some(fans)
+    (n > 2).then_some(fan)
 }
 
 /// The sizes of a fan's faces.
@@ -295,6 +330,7 @@ mod tests {
             let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
             let sites = EditSites::new(&[], &topology);
             let (_, plans) = plan_faces(&topology, rules, 3, &sites);
+            let sorter = Sorter { topology: &topology, rules, sites: &sites, valences: &valences(&topology) };
             let (mut library, mut walker) = (PlanLibrary::new(rules), RingWalker::default());
             let mut of_node = FxHashMap::default();
             for (face, plan) in plans.iter().enumerate() {
@@ -307,7 +343,11 @@ mod tests {
                 assert_eq!(plan.turn(), look.turn);
                 let node = library.node(&walker.extract(&topology, first + look.turn, rules.keeps_outer_tags()).mesh);
                 assert_eq!(*of_node.entry(node).or_insert(plan.turned(4 - look.turn)), plan.turned(4 - look.turn));
-                n_by_fans += u32::from(fans(&topology, first).is_some());
+                if topology.corners_at(first).1 == 4 {
+                    let by_walking: Option<Vec<Fan>> = (first..first + 4).map(|h| fan_at(&topology, h)).collect();
+                    n_by_fans += u32::from(by_walking.is_some());
+                    assert_eq!(sorter.fans(first).map(Vec::from), by_walking);
+                }
             }
         }
         assert!(n_by_fans > 100, "{n_by_fans} faces have fans");

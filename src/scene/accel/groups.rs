@@ -76,39 +76,58 @@ pub(super) fn half_area(b: &Bounds) -> f32 {
     size.x * size.y + size.y * size.z + size.z * size.x
 }
 
-fn sort(items: &mut [Item], axis: usize) {
-    items.sort_unstable_by(|a, b| a.center()[axis].total_cmp(&b.center()[axis]).then(a.number.cmp(&b.number)));
-}
-
 /// Sorts along the axis of the cheapest division; returns where it is.
 fn split_sorted(items: &mut [Item]) -> usize {
-    let mut best = (f32::INFINITY, 0, LANES);
-    for axis in 0..3 {
-        sort(items, axis);
-        let (cost, middle) = cheapest(items);
-        if cost < best.0 {
-            best = (cost, axis, middle);
-        }
-    }
-    if best.1 != 2 {
-        sort(items, best.1);
-    }
-    best.2
+    let orders = [0, 1, 2].map(|axis| Order::new(items, axis));
+    let costs = orders.each_ref().map(|order| cheapest(items, order));
+    let axis = (1..3).fold(0, |best, axis| if costs[axis].0 < costs[best].0 { axis } else { best });
+    orders[axis].apply(items);
+    costs[axis].1
 }
 
-/// The cheapest division of sorted items that leaves one group that is not full at most: its cost and place.
-fn cheapest(items: &[Item]) -> (f32, usize) {
+/// The order of up to [`MOST_SORTED`] items along an axis.
+struct Order {
+    /// The centre, as a number that is in the same order, and the item's place.
+    keys: [u64; MOST_SORTED],
+    len: usize,
+}
+
+impl Order {
+    fn new(items: &[Item], axis: usize) -> Self {
+        let mut keys = [0; MOST_SORTED];
+        for (place, (key, item)) in keys.iter_mut().zip(items).enumerate() {
+            let bits = item.center()[axis].to_bits();
+            let ascending = if bits >> 31 == 0 { bits ^ 1 << 31 } else { !bits };
+            *key = u64::from(ascending) << 32 | place as u64;
+        }
+        keys[..items.len()].sort_unstable();
+        Self { keys, len: items.len() }
+    }
+
+    /// The places of the items.
+    fn places(&self) -> impl DoubleEndedIterator<Item = usize> + ExactSizeIterator {
+        self.keys[..self.len].iter().map(|key| (key & 0xffff_ffff) as usize)
+    }
+
+    fn apply(&self, items: &mut [Item]) {
+        let before: [Item; MOST_SORTED] = std::array::from_fn(|i| items[i.min(self.len - 1)]);
+        items.iter_mut().zip(self.places()).for_each(|(item, place)| *item = before[place]);
+    }
+}
+
+/// The cheapest division of items in an order that leaves one group that is not full at most: its cost and place.
+fn cheapest(items: &[Item], order: &Order) -> (f32, usize) {
     let n = items.len();
     let mut above = [0.0; MOST_SORTED];
     let mut bounds = Bounds::EMPTY;
-    for (i, item) in items.iter().enumerate().rev() {
-        bounds = bounds.union(item.bounds);
+    for (i, place) in order.places().enumerate().rev() {
+        bounds = bounds.union(items[place].bounds);
         above[i] = half_area(&bounds);
     }
     bounds = Bounds::EMPTY;
     let mut best = (f32::INFINITY, LANES);
-    for middle in 1..n {
-        bounds = bounds.union(items[middle - 1].bounds);
+    for (middle, place) in (1..n).zip(order.places()) {
+        bounds = bounds.union(items[place].bounds);
         if middle.is_multiple_of(LANES) || (n - middle).is_multiple_of(LANES) {
             let n_nodes = |n: usize| n.div_ceil(LANES) as f32;
             let cost = half_area(&bounds) * n_nodes(middle) + above[middle] * n_nodes(n - middle);
