@@ -4,6 +4,7 @@
 
 use super::local::{LocalMesh, RingWalker};
 use super::pole::Pole;
+use super::rows::sort_by_weight;
 use super::rules::{self, CornerLimit, Origin, RefinedView, Row, RuleSet};
 use crate::topology::NONE;
 
@@ -106,7 +107,9 @@ impl<'a> RefinedRows<'a> {
         if *place == NONE {
             *place = self.rows.len() as u32;
             let origin = corner_origin(self.ring, refined.origin[v as usize]);
-            let row = if self.is_dry { Row::new() } else { rules::refined_row(&self.rules, self.ring, origin) };
+            let mut row = if self.is_dry { Row::new() } else { rules::refined_row(&self.rules, self.ring, origin) };
+            // As they will be kept: to sort them is much of the work of that.
+            sort_by_weight(&mut row);
             self.rows.push(row);
         }
         *place

@@ -1,10 +1,10 @@
 //! Which faces have equal rings, and so share a plan: found on all threads, before any plan is made.
 //!
-//! Most irregular faces are quads without any tag at their corners. The sizes of the faces around each corner, the corner's
-//! **fan**, tell all about their rings. Others are told apart by the keys of their rings.
+//! The rings of most irregular faces are told apart by the [fans](super::fans) at their corners, others by their keys.
 
 use super::draft::Draft;
 use super::edits::EditSites;
+use super::fans::{Fan, Fans, REGULAR_FAN, is_spread_out, sizes};
 use super::local::{LocalMesh, RingWalker, turn_of_fans};
 use super::numbering::Numbering;
 use super::plan::{NodeId, PlanLibrary};
@@ -12,24 +12,13 @@ use super::rules::RuleSet;
 use super::surface::{EDITED, REGULAR};
 use crate::ids::FaceId;
 use crate::parallel::{for_each, on_threads};
-use crate::topology::{HalfEdges, NONE, Topology};
+use crate::topology::{HalfEdges, Topology};
 use parking_lot::Mutex;
 use rustc_hash::FxHashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Faces that a thread sorts before it asks for more.
 const FACES_PER_TASK: usize = 512;
-
-/// The sizes of the faces around a corner but the corner's own, counter-clockwise: 3 less in two bits each, below a bit that
-/// is set.
-type Fan = u64;
-
-/// The fan of four quads.
-const REGULAR_FAN: Fan = 0b1_01_01_01;
-
-/// The largest face that is told of in a fan, and the number of faces at most.
-const MOST_CORNERS: u32 = 6;
-const MOST_FACES: u32 = 31;
 
 /// Kinds that are drafted before their nodes are made: drafts take more memory than nodes.
 const KINDS_PER_BATCH: usize = 1024;
@@ -77,7 +66,7 @@ pub(super) fn plan_faces(
     let chunks = plans.chunks_mut(FACES_PER_TASK).enumerate();
     let tasks: Vec<_> =
         chunks.map(|(i, plans)| Mutex::new(Task { first: i * FACES_PER_TASK, plans, thread: 0 })).collect();
-    let sorter = Sorter { topology, rules, sites, valences: &valences(topology) };
+    let sorter = Sorter { topology, rules, sites, fans: Fans::new(topology) };
     let of_threads = sort_faces(&sorter, n_threads, &tasks);
     let nodes = plan_kinds(topology, &mut library, &of_threads, n_threads);
     for_each(&tasks, n_threads, |_, task| {
@@ -95,8 +84,7 @@ struct Sorter<'a> {
     topology: &'a Topology,
     rules: RuleSet,
     sites: &'a EditSites,
-    /// See [`valences`].
-    valences: &'a [u8],
+    fans: Fans<'a>,
 }
 
 /// Finds the kind of each face; returns the kinds of each thread.
@@ -154,22 +142,58 @@ fn joined(of_threads: &[Kinds]) -> (Vec<Vec<usize>>, Vec<u32>) {
     (numbers, examples)
 }
 
-/// The nodes of the rings that start at these half-edges. All threads make drafts, one after the other becomes a node.
+/// The nodes of the rings that start at these half-edges. One thread puts drafts into the library, in their order; the others
+/// make them, and it helps while the next one is not there.
 fn plan_batch(topology: &Topology, library: &mut PlanLibrary, starts: &[u32], n_threads: usize) -> Vec<NodeId> {
-    let (rules, next) = (library.rules(), AtomicUsize::new(0));
-    let drafts: Vec<Mutex<Option<(LocalMesh, Draft)>>> = starts.iter().map(|_| Mutex::default()).collect();
-    on_threads(n_threads.min(starts.len().div_ceil(LEAST_KINDS)), || {
-        let (mut walker, mut of_quarters) = (RingWalker::default(), RingWalker::default());
-        loop {
-            let i = next.fetch_add(1, Ordering::Relaxed);
-            let Some(&start) = starts.get(i) else { break };
-            let ring = walker.extract(topology, start, rules.keeps_outer_tags()).mesh.clone();
-            let draft = Draft::new(rules, &ring, false, &mut of_quarters);
-            *drafts[i].lock() = Some((ring, draft));
-        }
-    });
-    let drafts = drafts.into_iter().map(|draft| draft.into_inner().expect("every kind was drafted"));
-    drafts.map(|(ring, draft)| library.drafted_node(ring, Some(draft))).collect()
+    let drafts = Drafts::new(topology, library.rules(), starts);
+    let n_helpers = n_threads.min(starts.len().div_ceil(LEAST_KINDS)).saturating_sub(1);
+    std::thread::scope(|scope| {
+        let help = || {
+            let mut walkers = Default::default();
+            while drafts.make_next(&mut walkers) {}
+        };
+        let helpers: Vec<_> = (0..n_helpers).map(|_| scope.spawn(help)).collect();
+        let mut walkers = Default::default();
+        let made = drafts.made.iter().map(|draft| {
+            loop {
+                let has_help = helpers.iter().any(|helper| !helper.is_finished());
+                if let Some((ring, draft)) = draft.lock().take() {
+                    return library.drafted_node(ring, Some(draft));
+                }
+                if !drafts.make_next(&mut walkers) {
+                    assert!(has_help, "a thread failed that was making a draft");
+                    std::thread::yield_now();
+                }
+            }
+        });
+        made.collect()
+    })
+}
+
+/// Rings and drafts of kinds, as far as they are made and not taken.
+struct Drafts<'a> {
+    topology: &'a Topology,
+    rules: RuleSet,
+    starts: &'a [u32],
+    made: Vec<Mutex<Option<(LocalMesh, Draft)>>>,
+    next: AtomicUsize,
+}
+
+impl<'a> Drafts<'a> {
+    fn new(topology: &'a Topology, rules: RuleSet, starts: &'a [u32]) -> Self {
+        let made = starts.iter().map(|_| Mutex::default()).collect();
+        Self { topology, rules, starts, made, next: AtomicUsize::new(0) }
+    }
+
+    /// Makes the next draft; returns whether there was one to make. The walkers are scratch, for the ring and its quarters.
+    fn make_next(&self, [walker, of_quarters]: &mut [RingWalker; 2]) -> bool {
+        let i = self.next.fetch_add(1, Ordering::Relaxed);
+        let Some(&start) = self.starts.get(i) else { return false };
+        let ring = walker.extract(self.topology, start, self.rules.keeps_outer_tags()).mesh.clone();
+        let draft = Draft::new(self.rules, &ring, false, of_quarters);
+        *self.made[i].lock() = Some((ring, draft));
+        true
+    }
 }
 
 impl Kinds {
@@ -180,7 +204,7 @@ impl Kinds {
             return REGULAR;
         }
         let (first, n) = topology.face_corners(face.0);
-        let fans = if n == 4 { sorter.fans(first) } else { None };
+        let fans = if n == 4 { sorter.fans.at(first) } else { None };
         match fans {
             Some([REGULAR_FAN, REGULAR_FAN, REGULAR_FAN, REGULAR_FAN]) => REGULAR,
             Some(fans) if is_spread_out(topology, first, &mut self.numbering) => self.by_fans(first, fans),
@@ -218,104 +242,6 @@ impl Kinds {
     }
 }
 
-/// The numbers of edges at vertices that have quads only around them and no tag, from 3 to [`MOST_FACES`]; 0 for others.
-fn valences(topology: &Topology) -> Vec<u8> {
-    let mut valences = vec![0u8; topology.n_vertices()];
-    for face in 0..topology.n_faces() as u32 {
-        let (first, n) = topology.face_corners(face);
-        for h in first..first + n {
-            let v = topology.vertex(h) as usize;
-            let is_other = n != 4 || topology.twin(h) == NONE || topology.is_tagged(v as u32);
-            valences[v] = if is_other { u8::MAX } else { valences[v].saturating_add(1) };
-        }
-    }
-    let in_range = 3..=MOST_FACES as u8;
-    valences.iter_mut().filter(|n| !in_range.contains(n)).for_each(|n| *n = 0);
-    valences
-}
-
-impl Sorter<'_> {
-    /// The fans of a quad, if they are closed, of three faces or more, and without tags.
-    fn fans(&self, first: u32) -> Option<[Fan; 4]> {
-        let mut fans = [0; 4];
-        for (h, fan) in (first..).zip(&mut fans) {
-            *fan = match self.valences[self.topology.vertex(h) as usize] {
-                0 => fan_at(self.topology, h)?,
-                n => fan_of_quads(n),
-            };
-        }
-        Some(fans)
-    }
-}
-
-fn fan_of_quads(n: u8) -> Fan {
-    const MOST: Fan = 0x5555_5555_5555_5555;
-    let below = (1 << (2 * (n - 1))) - 1;
-    1 << (2 * (n - 1)) | MOST & below
-}
-
-/// The fan of a corner, if it is closed, of three faces or more, and without tags.
-fn fan_at(topology: &Topology, h: u32) -> Option<Fan> {
-    if !topology.is_plain(h) {
-        return None;
-    }
-    let (mut fan, mut n) = (1, 1);
-    let mut spoke = turned(topology, h);
-    while spoke != h {
-        if spoke == NONE || n == MOST_FACES {
-            return None;
-        }
-        let (_, size) = topology.corners_at(spoke);
-        if size > MOST_CORNERS {
-            return None;
-        }
-        fan = fan << 2 | Fan::from(size - 3);
-        n += 1;
-        spoke = turned(topology, spoke);
-    }
-    (n > 2).then_some(fan)
-}
-
-/// The sizes of a fan's faces.
-fn sizes(fan: Fan) -> impl Iterator<Item = u32> {
-    let n = fan.ilog2() / 2;
-    (0..n).rev().map(move |i| 3 + (fan >> (2 * i) & 3) as u32)
-}
-
-/// The half-edge that follows `spoke` counter-clockwise around the vertex where it starts.
-#[inline(always)]
-fn turned(topology: &Topology, spoke: u32) -> u32 {
-    topology.twin(topology.prev(spoke))
-}
-
-/// Whether all vertices of the ring of a quad with [`fans`] are different ones, but for those that faces side by side share.
-fn is_spread_out(topology: &Topology, first: u32, vertices: &mut Numbering) -> bool {
-    vertices.clear();
-    let mut is_new = |h: u32| vertices.number(topology.vertex(h)).1;
-    (first..first + 4).all(|h| {
-        let beside = turned(topology, h);
-        // The two faces beside the edges of the quad have vertices in common with the fans of the next corners: of each, the
-        // end of the edge from the corner is counted where that follows counter-clockwise, and in a triangle there only.
-        let mut is_counted = topology.corners_at(beside).1 == 3;
-        let mut spoke = turned(topology, beside);
-        let mut are_new = is_new(h);
-        while are_new && spoke != h {
-            let end = topology.next(spoke);
-            are_new = is_counted || is_new(end);
-            is_counted = false;
-            let next = turned(topology, spoke);
-            let n_shared = if next == h { 4 } else { 3 };
-            let mut inner = end;
-            for _ in n_shared..topology.corners_at(spoke).1 {
-                inner = topology.next(inner);
-                are_new = are_new && is_new(inner);
-            }
-            spoke = next;
-        }
-        are_new
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -330,9 +256,9 @@ mod tests {
             let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
             let sites = EditSites::new(&[], &topology);
             let (_, plans) = plan_faces(&topology, rules, 3, &sites);
-            let sorter = Sorter { topology: &topology, rules, sites: &sites, valences: &valences(&topology) };
+            let fans = Fans::new(&topology);
             let (mut library, mut walker) = (PlanLibrary::new(rules), RingWalker::default());
-            let mut of_node = FxHashMap::default();
+            let (mut of_node, mut of_plan) = (FxHashMap::default(), FxHashMap::default());
             for (face, plan) in plans.iter().enumerate() {
                 let first = topology.face_corners(face as u32).0;
                 let look = walker.look(&topology, first);
@@ -342,12 +268,10 @@ mod tests {
                 }
                 assert_eq!(plan.turn(), look.turn);
                 let node = library.node(&walker.extract(&topology, first + look.turn, rules.keeps_outer_tags()).mesh);
-                assert_eq!(*of_node.entry(node).or_insert(plan.turned(4 - look.turn)), plan.turned(4 - look.turn));
-                if topology.corners_at(first).1 == 4 {
-                    let by_walking: Option<Vec<Fan>> = (first..first + 4).map(|h| fan_at(&topology, h)).collect();
-                    n_by_fans += u32::from(by_walking.is_some());
-                    assert_eq!(sorter.fans(first).map(Vec::from), by_walking);
-                }
+                let plan = plan.turned(4 - look.turn);
+                assert_eq!(*of_node.entry(node).or_insert(plan), plan);
+                assert_eq!(*of_plan.entry(plan).or_insert(node), node);
+                n_by_fans += u32::from(topology.corners_at(first).1 == 4 && fans.at(first).is_some());
             }
         }
         assert!(n_by_fans > 100, "{n_by_fans} faces have fans");

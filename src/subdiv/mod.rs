@@ -24,13 +24,15 @@
 //! Sources: Catmull & Clark 1978; Stam 1998; Nießner et al. 2012; Brainerd et al. 2016 (plans); OpenSubdiv's rules.
 //! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`dice`], [`edits`]. [`refine`] is the slow reference.
 //! What most irregular patches come to is written out: one step and boxes around a lone extraordinary vertex in `pole`, the
-//! points beside it in `stencils`. `kinds` finds the faces that share a plan, `route` the vertices of a ring whose plan is known.
+//! points beside it in `stencils`. `kinds` finds the faces that share a plan, by the `fans` at their corners if it can, and has
+//! their nodes drafted (`draft`); `route` finds the vertices of a ring whose plan is known.
 
 mod bounds;
 pub mod dice;
 mod draft;
 pub mod edits;
 pub mod eval;
+mod fans;
 mod kinds;
 pub mod local;
 mod numbering;

@@ -207,6 +207,11 @@ macro_rules! with_rows {
 }
 pub(super) use with_rows;
 
+/// Puts the terms of a row into the order in which they are kept.
+pub(super) fn sort_by_weight(row: &mut Row) {
+    row.sort_unstable_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+}
+
 #[inline(always)]
 fn copy_listed<T: Copy, I: Index>(list: &[I], from: &[T], to: &mut [T]) {
     for (to, i) in to.iter_mut().zip(list) {
@@ -228,7 +233,7 @@ impl RowStore {
         for row in rows {
             sorted.clear();
             sorted.extend_from_slice(row);
-            sorted.sort_unstable_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+            sort_by_weight(&mut sorted);
             numbers.push(self.row_number(&sorted));
         }
         let list = self.push_indices(&numbers);
