@@ -33,6 +33,8 @@ pub(super) struct Ring {
     cursors: Box<[AtomicU64]>,
     arena: Arena,
     segment_lines: usize,
+    /// One less than there are segments: bits of an age that say which is its.
+    segment_mask: usize,
     /// Segments that may be recycled while a pin lags behind the head.
     grace: u64,
     first_age: u64,
@@ -52,6 +54,7 @@ impl Ring {
             cursors: cursors.collect(),
             arena: Arena::new(segments * segment_lines)?,
             segment_lines,
+            segment_mask: segments - 1,
             grace: grace as u64,
             first_age,
         })
@@ -84,7 +87,7 @@ impl Ring {
 
     #[inline(always)]
     fn segment_of(&self, age: u64) -> usize {
-        age as usize & (self.cursors.len() - 1)
+        age as usize & self.segment_mask
     }
 
     #[inline(always)]

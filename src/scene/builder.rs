@@ -2,7 +2,7 @@
 
 use super::costs::BuildCosts;
 use super::world::{GridCache, WorldMesh};
-use crate::cache::{Block, BlockLayout, Claim, Recorder, Slot, Visit};
+use crate::cache::{Block, BlockLayout, Claim, Recorder, Slot, SlotId, Visit};
 use crate::grid::{CellRect, MAX_CELLS, NODE_BYTES, NodeView, PieceLayout, encode_node, is_node};
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Bounds, LatticeGrid};
@@ -170,13 +170,12 @@ impl<'w> Builder<'w> {
     pub fn build_root<'v>(
         &mut self,
         visit: &'v Visit<'_>,
-        slot: Slot<'v>,
         of: PatchContext<'_>,
-        cache: &GridCache,
+        cache: &'v GridCache,
         leaf_slot: u32,
     ) -> Block<'v> {
         cache.touch(of.id, leaf_slot);
-        self.build(visit, slot, of, None)
+        self.build(visit, visit.root(cache.table(of.id), SlotId(leaf_slot)), of, None)
     }
 
     #[inline(always)]

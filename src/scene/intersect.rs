@@ -97,13 +97,12 @@ impl Task for ClosestInMesh<'_, '_> {
         while let Some(leaf) = walk.nearest(kernel, ray, hit.t, |slot| visit.prefetch(visit.root(table, SlotId(slot))))
         {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
-            let slot = visit.root(table, SlotId(leaf.slot));
-            if let Some(block) = visit.get(slot) {
+            if let Some(block) = visit.get(visit.root(table, SlotId(leaf.slot))) {
                 builder.note_root(of, leaf.slot, block);
                 ClosestInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray }, hit }.run(kernel);
             } else {
                 // Apart, so that a block that is there stays in registers.
-                let block = builder.build_root(visit, slot, of, cache, leaf.slot);
+                let block = builder.build_root(visit, of, cache, leaf.slot);
                 builder.note_root(of, leaf.slot, block);
                 kernel.enter(ClosestInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray }, hit });
             }
@@ -133,12 +132,11 @@ impl Task for OccludedInMesh<'_, '_> {
         let mut walk = mesh.top().walk_any(&mut stacks.mesh);
         while let Some(leaf) = walk.next(kernel, ray, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
-            let slot = visit.root(table, SlotId(leaf.slot));
-            let is_hit = if let Some(block) = visit.get(slot) {
+            let is_hit = if let Some(block) = visit.get(visit.root(table, SlotId(leaf.slot))) {
                 builder.note_root(of, leaf.slot, block);
                 OccludedInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray } }.run(kernel)
             } else {
-                let block = builder.build_root(visit, slot, of, cache, leaf.slot);
+                let block = builder.build_root(visit, of, cache, leaf.slot);
                 builder.note_root(of, leaf.slot, block);
                 kernel.enter(OccludedInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray } })
             };

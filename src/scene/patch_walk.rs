@@ -5,7 +5,7 @@
 //! into memory a moment ago.
 
 use super::builder::{Builder, NODE_SIDE, PatchContext, child_cells, child_side};
-use crate::cache::{Block, Slot, Visit};
+use crate::cache::{Block, Visit};
 use crate::grid::{CellRect, LatticeHit, LatticeRay, NodeView, PieceView, is_node};
 use crate::math::simd::{Kernel, Task};
 
@@ -30,10 +30,11 @@ impl<'v> InPatch<'_, 'v, '_> {
         }
     }
 
-    /// Builds a child's block.
+    /// Builds a child's block. (The slot is made anew: handed over, it would be written to memory for blocks that are there, too.)
     #[cold]
     #[inline(never)]
-    fn build_child(self, builder: &mut Builder<'_>, slot: Slot<'v>, lane: usize) -> Self {
+    fn build_child(self, builder: &mut Builder<'_>, lane: usize) -> Self {
+        let slot = self.block.child(lane);
         let block = builder.build(self.visit, slot, self.of, Some(child_of(NodeView::new(self.block.bytes()), lane)));
         builder.note_child(self.depth + 1, lane, block);
         self.below(block)
@@ -73,8 +74,7 @@ impl Task for ClosestInPatch<'_, '_, '_, '_> {
         let Some(mut lane) = children.pop_nearest(hit.t) else { return };
         at.prefetch_children(children.mask);
         loop {
-            let slot = block.child(lane);
-            if let Some(child) = visit.get(slot) {
+            if let Some(child) = visit.get(block.child(lane)) {
                 builder.note_child(at.depth + 1, lane, child);
                 if is_node(child.bytes()) {
                     kernel.enter(ClosestInPatch { builder, at: at.below(child), hit });
@@ -82,7 +82,7 @@ impl Task for ClosestInPatch<'_, '_, '_, '_> {
                     PieceView::new(child.bytes()).closest(kernel, ray, of.patch, hit);
                 }
             } else {
-                let at = at.build_child(builder, slot, lane);
+                let at = at.build_child(builder, lane);
                 kernel.enter(ClosestInPatch { builder, at, hit });
             }
             let Some(next) = children.pop_nearest(hit.t) else { return };
@@ -112,8 +112,7 @@ impl Task for OccludedInPatch<'_, '_, '_, '_> {
         while children != 0 {
             let lane = children.trailing_zeros() as usize;
             children &= children - 1;
-            let slot = block.child(lane);
-            let is_hit = if let Some(child) = visit.get(slot) {
+            let is_hit = if let Some(child) = visit.get(block.child(lane)) {
                 builder.note_child(at.depth + 1, lane, child);
                 if is_node(child.bytes()) {
                     kernel.enter(OccludedInPatch { builder, at: at.below(child) })
@@ -121,7 +120,7 @@ impl Task for OccludedInPatch<'_, '_, '_, '_> {
                     PieceView::new(child.bytes()).occluded(kernel, ray, of.patch)
                 }
             } else {
-                let at = at.build_child(builder, slot, lane);
+                let at = at.build_child(builder, lane);
                 kernel.enter(OccludedInPatch { builder, at })
             };
             if is_hit {
