@@ -238,7 +238,7 @@ impl<K: Kernel> Slabs<K> {
     fn plane_t<const AXIS: i32>(&self, k: K, planes: &[[u8; 4]; 22], plane: Plane, offset: K::F) -> K::F {
         let two: &[[u8; 4]; 2] = planes[plane.index()..plane.index() + 2].try_into().expect("two units");
         let q = k.widen(bytemuck::cast_ref(two));
-        k.add(k.mul(q, k.shuffle::<AXIS>(self.step)), k.shuffle::<AXIS>(offset))
+        k.mul_add(q, k.shuffle::<AXIS>(self.step), k.shuffle::<AXIS>(offset))
     }
 }
 

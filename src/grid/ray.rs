@@ -132,9 +132,10 @@ pub(crate) type Twice = [f32; 8];
 /// So the ray passes through every box around the triangle that is widened by 8 u D. (Nearer triangles err less: one that lies within L of the
 /// origin, by 8 u L.)
 ///
-/// *Boxes.* A plane is tested as fl(fl(plane - o) * inv), or for 8-bit boxes as fl(fl(q * step_inv) + fl(fl(base - o) * inv)) with an exact
-/// `step_inv` but for the rounding of `inv` itself, and o rounded to f32, by u |o|. The errors, as distances along the axis, are at most 3 u D in the
-/// first case; in the second at most 2 u q step + 3 u |base - o| + u |sum| <= 8 u D, for no box is wider than 2 D.
+/// *Boxes.* A plane is tested as fl(plane * inv - fl(o * inv)), or for 8-bit boxes as fl(q * step_inv + fl(fl(base - o) * inv)) with an exact
+/// `step_inv` but for the rounding of `inv` itself, and o rounded to f32, by u |o|; the product may or may not be rounded before the sum. The errors, as
+/// distances along the axis, are at most u |plane| + u |o| + 2 u D in the first case, and |plane| + |o| <= `reach`; in the second at most
+/// 2 u q step + 3 u |base - o| + u |sum| <= 8 u D, for no box is wider than 2 D. Both are at most 8 u `reach`.
 ///
 /// All are covered by moving the near planes towards the origin and the far planes away from it by `slack` = 20 u `reach`; this
 /// is done once per ray, in `near_origin` and `far_origin`, whose rounding takes 2 u `reach` of it at most: 18 u `reach` >= 17 u `reach`. In a coordinate system of 2^24 steps, slack is 60 steps at most.

@@ -93,9 +93,8 @@ impl Task for ClosestInMesh<'_, '_> {
         let hit = &mut LatticeHit::none(ray.t_max());
         let table = cache.table(id);
         let visit = &pin.visit();
-        let mut walk = mesh.top().walk(&mut stacks.mesh);
-        while let Some(leaf) = walk.nearest(kernel, ray, hit.t, |slot| visit.prefetch(visit.root(table, SlotId(slot))))
-        {
+        let mut walk = mesh.top().walk(kernel, ray, &mut stacks.mesh);
+        while let Some(leaf) = walk.nearest(hit.t, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             if let Some(block) = visit.get(visit.root(table, SlotId(leaf.slot))) {
                 builder.note_root(of, leaf.slot, block);
@@ -129,8 +128,8 @@ impl Task for OccludedInMesh<'_, '_> {
         let ray = &lattice_ray(kernel, entering, id, ray, ray.t_max);
         let table = cache.table(id);
         let visit = &pin.visit();
-        let mut walk = mesh.top().walk_any(&mut stacks.mesh);
-        while let Some(leaf) = walk.next(kernel, ray, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
+        let mut walk = mesh.top().walk_any(kernel, ray, &mut stacks.mesh);
+        while let Some(leaf) = walk.next(|slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let is_hit = if let Some(block) = visit.get(visit.root(table, SlotId(leaf.slot))) {
                 builder.note_root(of, leaf.slot, block);

@@ -1,7 +1,7 @@
 //! The kernel of AVX2 registers.
 #![allow(unsafe_code)]
 
-use super::{Kernel, SET_LANES, Task};
+use super::{Kernel, ONE_LANE, PLACE_ZERO, SET_LANES, Task};
 use std::arch::x86_64::*;
 
 /// Eight lanes in one register. A value of this type proves that the processor has AVX2 (and the small extensions that came with it).
@@ -13,6 +13,7 @@ impl Avx2 {
     #[inline]
     pub fn detect() -> Option<Self> {
         let here = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("bmi2")
             && is_x86_feature_detected!("lzcnt")
@@ -21,7 +22,7 @@ impl Avx2 {
     }
 }
 
-#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn enter<T: Task>(kernel: Avx2, task: T) -> T::Output {
     task.run(kernel)
 }
@@ -38,6 +39,7 @@ impl Kernel for Avx2 {
     type F = __m256;
     type D = __m256d;
     type I = __m256i;
+    type O = __m128i;
 
     #[inline(always)]
     fn splat(self, x: f32) -> __m256 {
@@ -75,6 +77,10 @@ impl Kernel for Avx2 {
     #[inline(always)]
     fn div(self, a: __m256, b: __m256) -> __m256 {
         in_registers!(_mm256_div_ps(a, b))
+    }
+    #[inline(always)]
+    fn mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+        in_registers!(_mm256_fmadd_ps(a, b, c))
     }
     #[inline(always)]
     fn min(self, a: __m256, b: __m256) -> __m256 {
@@ -286,6 +292,43 @@ impl Kernel for Avx2 {
                 _mm256_permute2f128_pd::<0x31>(ab_odd, cd_odd),
             ]
         })
+    }
+    #[inline(always)]
+    fn in_order(self, enter: __m256, leave: __m256) -> __m128i {
+        in_registers!({
+            let missed = _mm256_castps_si256(_mm256_cmp_ps::<_CMP_NLE_UQ>(enter, leave));
+            let places = _mm256_castps_si256(_mm256_add_ps(enter, _mm256_set1_ps(PLACE_ZERO)));
+            let lower_halves =
+                _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 4, 5, 8, 9, 12, 13, -1, -1, -1, -1, -1, -1, -1, -1));
+            let places = _mm256_shuffle_epi8(_mm256_or_si256(places, missed), lower_halves);
+            _mm_unpacklo_epi64(_mm256_castsi256_si128(places), _mm256_extracti128_si256::<1>(places))
+        })
+    }
+    #[inline(always)]
+    fn first(self, order: __m128i) -> (usize, u16) {
+        let found = in_registers!(_mm_cvtsi128_si32(_mm_minpos_epu16(order))) as u32;
+        ((found >> 16) as usize, found as u16)
+    }
+    #[inline(always)]
+    fn without(self, order: __m128i, lane: usize) -> __m128i {
+        let lane = self.load_order(&ONE_LANE[lane % 8]);
+        in_registers!(_mm_or_si128(order, lane))
+    }
+    #[inline(always)]
+    fn has_any(self, order: __m128i) -> bool {
+        in_registers!(_mm_test_all_ones(order) == 0)
+    }
+    #[inline(always)]
+    fn load_order(self, x: &[u16; 8]) -> __m128i {
+        // SAFETY: `self` proves AVX2; `x` is 16 readable bytes and the load needs no alignment.
+        unsafe { _mm_loadu_si128(x.as_ptr().cast()) }
+    }
+    #[inline(always)]
+    fn store_order(self, x: __m128i) -> [u16; 8] {
+        let mut out = [0; 8];
+        // SAFETY: `self` proves AVX2; `out` is 16 writable bytes and the store needs no alignment.
+        unsafe { _mm_storeu_si128(out.as_mut_ptr().cast(), x) };
+        out
     }
     #[inline(always)]
     unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> __m256 {

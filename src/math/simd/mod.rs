@@ -9,6 +9,7 @@
 //! # Invariants
 //! 1. Both kernels give the same bits: an operation is one IEEE operation, correctly rounded; none is fused. A fused
 //!    multiply-add would also break the watertightness of triangles, whose edge functions must be exact negatives of each other.
+//!    The one exception, [`Kernel::mul_add`], is for boxes, where it can change what is visited but not what is hit.
 //! 2. An `Avx2` value exists only where the processor has AVX2: it is the witness that every `unsafe` block there leans on.
 
 #![allow(unsafe_code)]
@@ -29,6 +30,11 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     type D: Copy;
     /// Eight integers.
     type I: Copy;
+    /// Eight places in an order, each a number of 16 bits: [`LAST`](Self::LAST) for a lane that is in none.
+    type O: Copy;
+
+    /// The place of a lane that has none, after all others.
+    const LAST: u16 = u16::MAX;
 
     /// `x` in every lane.
     fn splat(self, x: f32) -> Self::F;
@@ -46,6 +52,8 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn mul(self, a: Self::F, b: Self::F) -> Self::F;
     /// Lanewise quotient.
     fn div(self, a: Self::F, b: Self::F) -> Self::F;
+    /// Lanewise `a b + c`, rounded once or twice: for boxes alone, whose test allows for either.
+    fn mul_add(self, a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// Lanewise `if a < b { a } else { b }`.
     fn min(self, a: Self::F, b: Self::F) -> Self::F;
     /// Lanewise `if a > b { a } else { b }`.
@@ -126,6 +134,19 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     /// The lower halves of the lanes.
     fn lower_halves(self, x: Self::I) -> [u16; 8];
 
+    /// Where lanes come in the order of `enter`, as [`place`] says; [`LAST`](Self::LAST) for those that are left before they are entered.
+    fn in_order(self, enter: Self::F, leave: Self::F) -> Self::O;
+    /// The first lane in the order, and its place.
+    fn first(self, order: Self::O) -> (usize, u16);
+    /// The order without a lane, 0 to 7.
+    fn without(self, order: Self::O, lane: usize) -> Self::O;
+    /// Whether a lane has a place.
+    fn has_any(self, order: Self::O) -> bool;
+    /// The places at `x`.
+    fn load_order(self, x: &[u16; 8]) -> Self::O;
+    /// The places as an array.
+    fn store_order(self, x: Self::O) -> [u16; 8];
+
     /// Two runs of four little-endian unsigned integers of `BYTES` bytes each (2, 3 or 4), at `at[0]` and `at[1]`; `base` is added to each
     /// (wrapping) and the sums are converted to floats.
     ///
@@ -139,6 +160,33 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     /// Asks for the cache line of `x`, which may be any address.
     fn prefetch<T>(self, x: *const T);
 }
+
+/// To this sum floats are added to come out as whole numbers of [`PLACE_STEP`]: their last 16 bits are the place.
+const PLACE_ZERO: f32 = (1u64 << 33) as f32;
+
+/// Lattice steps from one place in an order of distances to the next.
+const PLACE_STEP: f32 = 1024.0;
+
+/// The place of a distance from 0 up to three times 2^24, which is as far as a lattice reaches, and of greater ones a place after those.
+/// It never falls as the distance grows.
+#[inline(always)]
+pub fn place(distance: f32) -> u16 {
+    const GREATEST: f32 = 65_000.0 * PLACE_STEP;
+    let distance = if distance > 0.0 { distance } else { 0.0 };
+    let distance = if distance < GREATEST { distance } else { GREATEST };
+    (distance + PLACE_ZERO).to_bits() as u16
+}
+
+/// For each lane the places that leave all others as they are, and take its own away.
+static ONE_LANE: [[u16; 8]; 8] = {
+    let mut table = [[0; 8]; 8];
+    let mut lane = 0;
+    while lane < 8 {
+        table[lane][lane] = u16::MAX;
+        lane += 1;
+    }
+    table
+};
 
 /// For every mask the lanes whose bits are set.
 static SET_LANES: [[u8; 8]; 256] = {

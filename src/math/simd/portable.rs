@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code)]
 
-use super::{Kernel, SET_LANES, Task};
+use super::{Kernel, ONE_LANE, SET_LANES, Task, place};
 use std::array::from_fn;
 
 /// Eight lanes as an array of floats.
@@ -28,6 +28,7 @@ impl Kernel for Portable {
     type F = [f32; 8];
     type D = [f64; 4];
     type I = [i32; 8];
+    type O = [u16; 8];
 
     #[inline(always)]
     fn splat(self, x: f32) -> [f32; 8] {
@@ -60,6 +61,10 @@ impl Kernel for Portable {
     #[inline(always)]
     fn div(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
         zip(a, b, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn mul_add(self, a: [f32; 8], b: [f32; 8], c: [f32; 8]) -> [f32; 8] {
+        self.add(self.mul(a, b), c)
     }
     #[inline(always)]
     fn min(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
@@ -216,6 +221,31 @@ impl Kernel for Portable {
     fn transpose4(self, x: [[f64; 4]; 4]) -> [[f64; 4]; 4] {
         from_fn(|i| from_fn(|k| x[k][i]))
     }
+    #[inline(always)]
+    fn in_order(self, enter: [f32; 8], leave: [f32; 8]) -> [u16; 8] {
+        from_fn(|k| if enter[k] <= leave[k] { place(enter[k]) } else { Self::LAST })
+    }
+    #[inline(always)]
+    fn first(self, order: [u16; 8]) -> (usize, u16) {
+        let first = (1..8).fold(0, |first, k| if order[k] < order[first] { k } else { first });
+        (first, order[first])
+    }
+    #[inline(always)]
+    fn without(self, order: [u16; 8], lane: usize) -> [u16; 8] {
+        from_fn(|k| order[k] | ONE_LANE[lane][k])
+    }
+    #[inline(always)]
+    fn has_any(self, order: [u16; 8]) -> bool {
+        order != [Self::LAST; 8]
+    }
+    #[inline(always)]
+    fn load_order(self, x: &[u16; 8]) -> [u16; 8] {
+        *x
+    }
+    #[inline(always)]
+    fn store_order(self, x: [u16; 8]) -> [u16; 8] {
+        x
+    }
     // SAFETY: nothing here relies on the caller's promise: a place outside `bytes` panics. The trait says `unsafe` for kernels
     // that read without looking.
     #[inline(always)]
@@ -227,7 +257,8 @@ impl Kernel for Portable {
             u32::from_le_bytes(word).wrapping_add_signed(base) as i32 as f32
         })
     }
-    #[inline(always)]
+    // Apart, so that who can do it with vector registers does not pay for its stack frame.
+    #[inline(never)]
     fn enter<T: Task>(self, task: T) -> T::Output {
         task.run(self)
     }

@@ -54,6 +54,45 @@ impl Task for Round {
     }
 }
 
+/// Orders of lanes that are met and lanes that are not, and what is left of them one by one.
+struct RoundOfOrders(u32);
+
+impl Task for RoundOfOrders {
+    type Output = Vec<u16>;
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> Vec<u16> {
+        let number = |i: u32| ((i + 1).wrapping_mul(self.0 + 3).wrapping_mul(0x9E37_79B9) >> 16) as f32 * 700.0;
+        let enter: [f32; 8] = std::array::from_fn(|i| if i == 2 { 0.0 } else { number(i as u32) });
+        let leave = std::array::from_fn(|i| if i % 3 == 0 { number(i as u32 + 40) } else { enter[i] });
+        let mut order = k.in_order(k.load(&enter), k.load(&leave));
+        let mut out = k.store_order(order).to_vec();
+        for lane in 0..8 {
+            assert!(if enter[lane] <= leave[lane] { out[lane] == place(enter[lane]) } else { out[lane] == K::LAST });
+        }
+        while k.has_any(order) {
+            let (lane, place) = k.first(k.load_order(&k.store_order(order)));
+            out.extend([lane as u16, place]);
+            order = k.without(order, lane);
+        }
+        out
+    }
+}
+
+#[test]
+fn the_detected_kernel_orders_lanes_as_the_portable_one() {
+    for seed in 0..2000 {
+        assert_eq!(run(RoundOfOrders(seed)), RoundOfOrders(seed).run(Portable), "seed {seed}");
+    }
+}
+
+#[test]
+fn places_never_fall_and_leave_the_last_one_free() {
+    let distances = (0..5000).map(|i| 16_384.7 * i as f32).chain([f32::MAX, f32::INFINITY]);
+    let places: Vec<u16> = [f32::NEG_INFINITY, -1.0, 0.0].into_iter().chain(distances).map(place).collect();
+    assert!(places.is_sorted() && *places.last().expect("some") < Portable::LAST);
+    assert!(place(3.0 * 16_777_216.0) < place(f32::INFINITY), "what a lattice reaches has places of its own");
+}
+
 #[test]
 fn the_detected_kernel_gives_the_bits_of_the_portable_one() {
     for seed in 0..2000 {

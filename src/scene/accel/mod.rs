@@ -2,20 +2,21 @@
 //!
 //! It is a **wide tree**: its **nodes** have up to eight **lanes**. A lane is empty, an
 //! inner node or a **leaf**: one patch. A leaf is named by its **leaf slot**, `8 * node + lane`; the cache's table of slots is indexed by it, so
-//! its address is known as soon as the leaf is put on the stack, and can be fetched ahead.
+//! its address is known as soon as the node is tested, and can be fetched ahead.
 //!
 //! ```text
-//!   node, 192 + 32 bytes                 stack entry, 64 bits, ordered by t
-//!   ┌───────────────────────┬─────────┐  ┌──────────────┬─┬──────────────────────┐
-//!   │ x, y, z low, x, y, z  │ 8 refs  │  │ t of entry   │L│ node, or leaf slot   │
-//!   │ high: 6 x 8 floats    │ 32 bits │  └──────────────┴─┴──────────────────────┘
-//!   └───────────────────────┴─────────┘
+//!   node, 192 + 32 bytes                 open node, on the stack
+//!   ┌───────────────────────┬─────────┐  ┌───────────────────────────────────┬──────┐
+//!   │ x, y, z low, x, y, z  │ 8 refs  │  │ for each lane the place of its    │ node │
+//!   │ high: 6 x 8 floats    │ 32 bits │  │ entry in the order, or LAST, 8x16 │      │
+//!   └───────────────────────┴─────────┘  └───────────────────────────────────┴──────┘
 //! ```
 //!
 //! # Invariants
 //! 1. A lane's box holds every box below it.
 //! 2. The test of a box is conservative against the triangle test ([`LatticeRay`](crate::grid::LatticeRay) has the argument), so a patch that a ray hits is visited.
-//! 3. The lanes of a node are visited in the order of their entry; those entered at exactly `t_max` are visited too, so that ties are seen.
+//! 3. The lanes of a node are visited in the order of their entry, to within two [places](crate::math::simd::place); those entered at exactly `t_max`
+//!    are visited too, so that ties are seen.
 //! 4. No arrangement of boxes makes the tree deep or its build quadratic.
 //!
 //! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs). Read `traverse.rs` first.
@@ -44,7 +45,7 @@ pub struct LeafRef {
 /// Lanes of a node.
 const LANES: usize = 8;
 
-/// Marks a leaf: in a node's refs with a patch, in a stack entry with a slot.
+/// Marks a leaf in a node's refs.
 const LEAF: u32 = 1 << 31;
 
 /// The ref of an empty lane.
