@@ -3,7 +3,8 @@
 //! Toy sizes: blocks of one line, two segments of one or two lines. The arena has a shadow that loom watches, so a block
 //! that is read while it is written, or without the order that publication and recycling must give, fails the model
 //! even if the bytes happen to be right. Two threads are explored without bound where that ends within minutes, else with
-//! the bound of preemptions that the test names; three threads with at most two preemptions.
+//! the bound of preemptions that the test names; three threads with at most two preemptions, or with one of them over before the
+//! others meet. Which weaker ordering fails which model stands in `notes/cache.md`.
 #![cfg(loom)]
 
 use lazytess::cache::{
@@ -12,7 +13,7 @@ use lazytess::cache::{
 };
 use loom::thread;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 const LINE: usize = 64;
 
@@ -44,12 +45,32 @@ impl Toy {
         })
     }
 
+    /// Spawns such a thread and waits until it is over, though nothing orders what it did before what the caller does next.
+    fn spawn_and_see_end(self: &Arc<Self>, visits: &'static [&'static [u32]]) -> thread::JoinHandle<()> {
+        let (toy, is_over) = (self.clone(), Flag::default());
+        let flag = is_over.clone();
+        let thread = thread::spawn(move || {
+            let mut pin = toy.cache.pin();
+            visits.iter().for_each(|slots| toy.visit(&mut pin, slots));
+            drop(pin);
+            flag.raise();
+        });
+        is_over.wait();
+        thread
+    }
+
     /// Fetches all these slots in one visit, then looks at all blocks again: they must have stayed.
     fn visit(&self, pin: &mut Pin<'_>, slots: &[u32]) {
         let visit = pin.visit();
         let blocks: Vec<_> =
             slots.iter().map(|&id| fetch(&visit, visit.root(&self.table, SlotId(id)), id, 0)).collect();
         blocks.iter().zip(slots).for_each(|(block, &id)| check(block, id));
+    }
+
+    /// Fetches a block that can have a child.
+    fn parent(&self, pin: &mut Pin<'_>, root: u32) {
+        let visit = pin.visit();
+        check(&fetch(&visit, visit.root(&self.table, SlotId(root)), root, 1), root);
     }
 
     /// Fetches a block with a child, and the child, in one visit.
@@ -59,6 +80,22 @@ impl Toy {
         let child = fetch(&visit, parent.child(0), 7 + root, 0);
         check(&parent, root);
         check(&child, 7 + root);
+    }
+}
+
+/// What a thread waits for without being ordered after what it waits for: loom does not know it.
+#[derive(Clone, Default)]
+struct Flag(Arc<AtomicBool>);
+
+impl Flag {
+    fn raise(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    fn wait(&self) {
+        while !self.0.load(Ordering::Relaxed) {
+            thread::yield_now();
+        }
     }
 }
 
@@ -151,21 +188,6 @@ fn child_words_are_not_mistaken_for_bytes_nor_the_other_way_round() {
 }
 
 #[test]
-fn a_block_is_copied_while_another_thread_reads_and_fills_it() {
-    explore(Some(2), || {
-        let toy = Toy::with(4, 2, 4, Reinsert::All);
-        let mut pin = toy.cache.pin();
-        (0..3).for_each(|root| toy.family(&mut pin, root));
-        pin.release();
-        let shared = toy.clone();
-        let other = thread::spawn(move || shared.family(&mut shared.cache.pin(), 0));
-        toy.family(&mut pin, 0);
-        toy.family(&mut pin, 3);
-        other.join().unwrap();
-    });
-}
-
-#[test]
 fn a_pin_word_passes_from_thread_to_thread() {
     explore(Some(3), || {
         let toy = Toy::new(2, 1, 3);
@@ -174,6 +196,92 @@ fn a_pin_word_passes_from_thread_to_thread() {
         first.join().unwrap();
         second.join().unwrap();
         toy.visit(&mut toy.cache.pin(), &[2]);
+    });
+}
+
+/// A pin that stands at 5 does not copy the block of age 4 and builds its child; one at 6 copies it meanwhile.
+#[test]
+fn a_block_is_copied_while_another_thread_reads_and_fills_it() {
+    explore(Some(2), || {
+        let toy = Toy::with(4, 4, 5, Reinsert::Parents);
+        let mut pin = toy.cache.pin();
+        toy.parent(&mut pin, 0);
+        toy.parent(&mut pin, 1);
+        toy.visit(&mut pin, &[2]);
+        toy.parent(&mut pin, 3);
+        let shared = toy.clone();
+        let builder = thread::spawn(move || shared.family(&mut shared.cache.pin(), 0));
+        toy.parent(&mut pin, 4);
+        toy.family(&mut pin, 0);
+        builder.join().unwrap();
+    });
+}
+
+#[test]
+fn a_pin_that_moves_on_answers_for_what_it_read() {
+    explore(None, || {
+        let toy = Toy::new(2, 1, 3);
+        let mut pin = toy.cache.pin();
+        toy.visit(&mut pin, &[0]);
+        let (has_read, may_move) = (Flag::default(), Flag::default());
+        let (shared, read, moved) = (toy.clone(), has_read.clone(), may_move.clone());
+        let reader = thread::spawn(move || {
+            let mut pin = shared.cache.pin();
+            shared.visit(&mut pin, &[0]);
+            read.raise();
+            moved.wait();
+            pin.visit();
+        });
+        has_read.wait();
+        toy.visit(&mut pin, &[1]);
+        let visit = pin.visit();
+        may_move.raise();
+        fetch(&visit, visit.root(&toy.table, SlotId(2)), 2, 0);
+        reader.join().unwrap();
+    });
+}
+
+#[test]
+fn who_takes_over_a_pin_word_answers_for_its_last_owner() {
+    explore(None, || {
+        let toy = Toy::new(2, 1, 3);
+        let mut pin = toy.cache.pin();
+        toy.visit(&mut pin, &[0]);
+        let reader = toy.spawn_and_see_end(&[&[0]]);
+        toy.visit(&mut pin, &[1]);
+        let visit = pin.visit();
+        let heir = toy.spawn(&[&[]]);
+        fetch(&visit, visit.root(&toy.table, SlotId(2)), 2, 0);
+        reader.join().unwrap();
+        heir.join().unwrap();
+    });
+}
+
+#[test]
+fn who_writes_where_another_has_recycled_waits_for_the_readers_too() {
+    explore(Some(2), || {
+        let toy = Toy::new(2, 2, 6);
+        let mut pin = toy.cache.pin();
+        toy.visit(&mut pin, &[0, 1]);
+        let reader = toy.spawn_and_see_end(&[&[1]]);
+        toy.visit(&mut pin, &[2, 3]);
+        let writer = toy.spawn(&[&[4]]);
+        toy.visit(&mut pin, &[5]);
+        reader.join().unwrap();
+        writer.join().unwrap();
+    });
+}
+
+/// With 32 segments the grace is 2: a pin at 63 may read ages from 34, which are recycled when 66 is opened.
+#[test]
+fn a_longer_grace() {
+    explore(Some(2), || {
+        let toy = Toy::new(32, 1, 36);
+        let mut pin = toy.cache.pin();
+        (0..32).for_each(|id| toy.visit(&mut pin, &[id]));
+        let reader = toy.spawn(&[&[2]]);
+        (32..35).for_each(|id| toy.visit(&mut pin, &[id]));
+        reader.join().unwrap();
     });
 }
 

@@ -72,12 +72,12 @@
 //! 3. *While a pin stands at `p`, no segment of an age above `p + G - S` is recycled.* Recycling age `a` means opening
 //!    age `a + S`, and `a + S <= p + G` by 2. It holds for what the pin's thread reads and, since it reserves at an age
 //!    of at least `p` and `G < S`, for what it writes.
-//! 4. *No announcement is missed.* The pin's thread stores `p`, fences, and sees the head still at `p`. A recycler sees
-//!    the head at `h`, fences, and then scans the pins to open `h + 1`. Both fences are `SeqCst`. If `h > p`, the pin's
-//!    thread has looked at the head before the recycler, hence fenced before it, hence the scan sees the pin word. If
-//!    `h <= p` the recycler opens at most `p + 1 <= p + G`, which the pin allows anyway; this is why `G >= 1`.
-//!    (With `G = 1` the recycler's own pin stands at `h`, so that it has fenced already when it moved there, and the fence
-//!    before the scan repeats what is done; with a longer grace it is needed.)
+//! 4. *No announcement is missed.* A pin's thread sees the head at `p`, stores `p`, fences (`SeqCst`), and sees the head
+//!    still at `p`. A recycler opens `h + 1` only if all pins stand at `h + 1 - G` or later, its own among them, which stands at
+//!    some `c`. If `h >= p + G`, then `c > p`: the recycler saw the head at `c` before it fenced, the other thread saw it
+//!    at `p` after it fenced, so the other's fence was first, and the scan, which comes after the recycler's fence, sees the
+//!    other's pin word. If `h < p + G`, the recycler opens at most `p + G`, which the pin allows anyway. (With `G = 0`
+//!    the recycler's own pin would stop it.)
 //! 5. *What was read is read before it is overwritten.* A pin word is stored with `Release` and scanned with `Acquire`,
 //!    the head is advanced with `Release` after the scan, and who writes in a segment has loaded the head with `Acquire`.
 //!    Every thread that may advance the head has made its own scan, so it does not matter whose advance succeeds.

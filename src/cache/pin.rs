@@ -40,7 +40,8 @@ impl Pins {
                 && word.compare_exchange(FREE, UNPINNED, Ordering::Acquire, Ordering::Relaxed).is_ok()
         };
         let idx = self.words.iter().position(|word| taken(word))?;
-        self.n_used.fetch_max(idx + 1, Ordering::AcqRel);
+        // `Relaxed`: the fence of the first announcement makes recyclers see it, as it does with the announcement.
+        self.n_used.fetch_max(idx + 1, Ordering::Relaxed);
         Some(idx)
     }
 
@@ -51,7 +52,7 @@ impl Pins {
     /// Whether a pin stands at an age before `age`. `Acquire` orders what that pin's thread read before it moved on
     /// before everything that follows here: the head's advance and all writes to the recycled segment.
     pub(super) fn any_before(&self, age: u64) -> bool {
-        let used = &self.words[..self.n_used.load(Ordering::Acquire)];
+        let used = &self.words[..self.n_used.load(Ordering::Relaxed)];
         used.iter().map(|word| word.load(Ordering::Acquire)).any(|pin| pin > UNPINNED && pin < age)
     }
 }

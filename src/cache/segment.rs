@@ -3,7 +3,7 @@
 
 use super::memory::{LINE, Memory};
 use super::pin::Pins;
-use super::sync::{AtomicU64, Ordering, fence};
+use super::sync::{AtomicU64, Ordering};
 use super::word::{MAX_AGE, MAX_BLOCK_LINES, Place, WORDS_PER_LINE};
 use crossbeam::utils::CachePadded;
 
@@ -133,17 +133,18 @@ impl Ring {
         if next > MAX_AGE {
             return false;
         }
-        // Invariant 4: the scan of the pins comes after a fence that comes after the head was seen at `age`.
-        fence(Ordering::SeqCst);
+        // Invariant 4: the caller's own pin stands where it may if this passes, so that its fence is one for this scan, too.
         if pins.any_before(next.saturating_sub(self.grace)) {
             return false;
         }
+        // `Relaxed`: a cursor guards no memory but its own, and who sees the new head finds it reset by this thread or by one
+        // whose reset this thread has seen.
         let cursor = &self.cursors[self.segment_of(next)];
-        let old = cursor.load(Ordering::Acquire);
+        let old = cursor.load(Ordering::Relaxed);
         if old >> USED_BITS < next {
-            let _ = cursor.compare_exchange(old, next << USED_BITS, Ordering::AcqRel, Ordering::Acquire);
+            let _ = cursor.compare_exchange(old, next << USED_BITS, Ordering::Relaxed, Ordering::Relaxed);
         }
-        let _ = self.head.compare_exchange(age, next, Ordering::AcqRel, Ordering::Acquire);
+        let _ = self.head.compare_exchange(age, next, Ordering::Release, Ordering::Relaxed);
         true
     }
 

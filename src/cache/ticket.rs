@@ -155,7 +155,7 @@ impl<'v> Ticket<'v> {
 
     /// Puts a finished block into the slot, whatever useless word is there, unless another thread was faster.
     fn link(&mut self, mine: u64) -> Block<'v> {
-        let seen = self.word.load(Ordering::Acquire);
+        let seen = self.word.load(Ordering::Relaxed);
         // `Release`: whoever sees the word sees the block. A word that this visit cannot read is of no use to later
         // ones, so that replacing it loses nothing.
         if !self.visit.can_read(seen) {
