@@ -158,6 +158,11 @@ impl<'c> Pin<'c> {
         }
     }
 
+    /// Whether no table is gone whose slots this thread has built blocks of its own for: another may have its address.
+    pub(super) fn knows_all_tables(&self) -> bool {
+        self.cache.tag.n_tables_gone() == self.n_tables_gone
+    }
+
     /// Announces the head's age and makes sure that the announcement was in time (invariant 4). Each further round means
     /// that the head has moved, and once a recycler has seen the pin the head can move only a few segments more.
     #[cold]

@@ -103,6 +103,19 @@ fn a_thread_forgets_its_own_blocks_before_they_are_many() {
 }
 
 #[test]
+fn a_block_of_ones_own_is_not_taken_for_one_of_a_later_table() {
+    let cache = cache(4 * 64, 4);
+    let mut pin = cache.pin();
+    let visit = pin.visit();
+    // The next table has the address of the last one, as a rule.
+    for id in 1..20 {
+        let table = cache.table(1);
+        let block = fetch(&visit, visit.root(&table, SlotId(0)), id, bytes(1000));
+        assert_eq!(block.bytes()[0], id);
+    }
+}
+
+#[test]
 fn a_block_larger_than_a_segment_is_used_once() {
     let cache = cache(4 * 256, 4);
     let table = cache.table(1);

@@ -47,7 +47,9 @@ impl<'p> Visit<'p> {
     #[cold]
     pub fn claim<'v>(&'v self, slot: Slot<'v>) -> Claim<'v> {
         let word = slot.word_in(self.tag());
-        if let Some((bytes, word_lines)) = self.pin.scratch.recall(slot.key()) {
+        if self.pin.knows_all_tables()
+            && let Some((bytes, word_lines)) = self.pin.scratch.recall(slot.key())
+        {
             count(&self.pin.counters.private_hits);
             return Claim::Ready(self.private_block_of(bytes, word_lines));
         }
