@@ -10,8 +10,8 @@ use crate::topology::NONE;
 
 /// A ring's node, on its own.
 pub(super) enum Draft {
-    /// See [`rules::regular_rows`].
-    Regular([[Row; 4]; 4]),
+    /// The rows of its 16 control points, as of [`rules::regular_rows`], one after the other.
+    Regular(Vec<Row>),
     /// One Catmull-Clark step.
     Split(SplitDraft),
 }
@@ -48,7 +48,7 @@ impl Draft {
         let n = ring.n_corners();
         let may_be_regular = n == 4 && !rules.shares_sharper(ring);
         if may_be_regular && let Some(rows) = rules::regular_rows(ring) {
-            return Draft::Regular(rows);
+            return Draft::Regular(rows.into_iter().flatten().collect());
         }
         let refined = RefinedView::new(rules, ring);
         let (mut rows, pole) = RefinedRows::new(rules, ring, &refined, is_dry);

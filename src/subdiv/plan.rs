@@ -363,8 +363,8 @@ impl PlanLibrary {
         match draft.unwrap_or_else(|| Draft::new(self.rules, ring, false, &mut self.walker)) {
             Draft::Regular(rows) => {
                 let node = &mut self.nodes[id.index()];
-                (node.rows, node.n_children) = (self.rows.push(rows.iter().flatten()), 0);
-                node.is_listed = rows.iter().flatten().all(|row| matches!(row[..], [(_, 1.0)]));
+                (node.rows, node.n_children) = (self.rows.push(&rows), 0);
+                node.is_listed = rows.iter().all(|row| matches!(row[..], [(_, 1.0)]));
             }
             Draft::Split(draft) => self.split(id, ring, draft),
         }
