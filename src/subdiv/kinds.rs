@@ -68,7 +68,7 @@ pub(super) fn plan_faces(
         chunks.map(|(i, plans)| Mutex::new(Task { first: i * FACES_PER_TASK, plans, thread: 0 })).collect();
     let sorter = Sorter { topology, rules, sites, fans: Fans::new(topology) };
     let of_threads = sort_faces(&sorter, n_threads, &tasks);
-    let nodes = plan_kinds(topology, &mut library, &of_threads, n_threads);
+    let nodes = plan_kinds(topology, &mut library, of_threads, n_threads);
     for_each(&tasks, n_threads, |_, task| {
         let Task { plans, thread, .. } = &mut *task.lock();
         for plan in plans.iter_mut().filter(|plan| ![REGULAR, EDITED].contains(plan)) {
@@ -114,10 +114,12 @@ fn sort_faces(sorter: &Sorter<'_>, n_threads: usize, tasks: &[Mutex<Task<'_>>]) 
 fn plan_kinds(
     topology: &Topology,
     library: &mut PlanLibrary,
-    of_threads: &[Kinds],
+    of_threads: Vec<Kinds>,
     n_threads: usize,
 ) -> Vec<Vec<NodeId>> {
-    let (kinds, examples) = joined(of_threads);
+    let (kinds, examples) = joined(&of_threads);
+    // Keys of irregular meshes are many, and the library has its own.
+    drop(of_threads);
     let nodes: Vec<NodeId> =
         examples.chunks(KINDS_PER_BATCH).flat_map(|starts| plan_batch(topology, library, starts, n_threads)).collect();
     kinds.iter().map(|kinds| kinds.iter().map(|&kind| nodes[kind]).collect()).collect()
