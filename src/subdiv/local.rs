@@ -401,11 +401,6 @@ impl RingWalker {
         Look { turn, is_plain, is_regular }
     }
 
-    /// Hands over the ring that was extracted last.
-    pub fn take(&mut self) -> Extracted {
-        std::mem::take(&mut self.ring)
-    }
-
     /// Finds the faces. Returns the number of corners.
     fn walk<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32) -> u32 {
         self.clear();
