@@ -28,7 +28,7 @@
 use super::canvas::{Canvas, Surprises, look};
 use super::cells::{CELL_SIDES, Cell, CellPlace, TILE_SIDE, Tile, TracedProbe};
 use super::film::{FirstHit, PixelRecord};
-use super::follow::{Origin, beside_traced, display_difference, follow, is_surprised};
+use super::follow::{Origin, Shown, beside_traced, display_difference, follow, is_surprised};
 use super::footprint::{Claim, Footprints, Scenery};
 use super::integrators::{LightMasks, Probe, Sample, Shader, Smooth, SmoothPoint};
 use super::rays::RayCounts;
@@ -300,7 +300,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
             let (ray, sampler) = interpolation.pixels().sample(pixel, 0);
             self.shader.probe(interpolation.camera, ray, sampler)
         };
-        self.tile.set_probe(pixel, TracedProbe { probe, misses: self.shader.misses() - before });
+        let shown = Shown::new(probe.sample.radiance);
+        self.tile.set_probe(pixel, TracedProbe { probe, shown, misses: self.shader.misses() - before });
     }
 
     /// The pixel, unless it is to be interpolated: then a mere note of that.
@@ -361,7 +362,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         let around = (0..9).map(|k| [(x + k % 3).checked_sub(1), (y + k / 3).checked_sub(1)]);
         around.into_iter().all(|place| match place {
             [Some(x), Some(y)] if self.tile.has([x, y]) => match (self.tile.probe([x, y]), self.tile.find([x, y]).1) {
-                (Some(other), _) => self.job.is_alike(&own.probe, &other.probe),
+                (Some(other), _) => self.job.is_alike(own, other),
                 (None, cell) => matches!(cell, Cell::Holds { .. }),
             },
             _ => false,
@@ -383,7 +384,7 @@ impl<T> Worker<'_, '_, T> {
     /// Whether a cell whose probes are traced can be interpolated.
     fn judge(&mut self, place: &CellPlace) -> Cell {
         let pixels = place.probe_pixels();
-        let probes = pixels.map(|pixel| self.tile.probe(pixel).expect("all probes of a judged cell are traced").probe);
+        let probes = pixels.map(|pixel| *self.tile.probe(pixel).expect("all probes of a judged cell are traced"));
         let Some(smooths) = all_smooth(&probes) else { return Cell::Split(Reason::Silhouette) };
         if let Some(reason) = first_difference(&smooths) {
             return Cell::Split(reason);
@@ -397,25 +398,30 @@ impl<T> Worker<'_, '_, T> {
         }
     }
 
-    fn is_connected<const N: usize>(&mut self, place: &CellPlace, probes: &[Probe; N], smooths: &[Smooth; N]) -> bool {
+    fn is_connected<const N: usize>(
+        &mut self,
+        place: &CellPlace,
+        probes: &[TracedProbe; N],
+        smooths: &[Smooth; N],
+    ) -> bool {
         let mut hits: Vec<_> = Vec::with_capacity(N);
-        for first in probes.iter().map(|p| p.sample.first) {
+        for first in probes.iter().map(|p| p.probe.sample.first) {
             let hit = (MeshId(first.mesh), PatchId(first.patch));
             if !hits.contains(&hit) {
                 hits.push(hit);
             }
         }
-        let farthest = probes.iter().fold(0.0, |far: f32, p| far.max(p.sample.first.depth));
+        let farthest = probes.iter().fold(0.0, |far: f32, p| far.max(p.probe.sample.first.depth));
         let claim = Claim { hits: &hits, outside: smooths[0].outside, farthest };
         self.footprints.agree(place.pixels(), &claim)
     }
 }
 
-fn all_smooth<const N: usize>(probes: &[Probe; N]) -> Option<[Smooth; N]> {
-    let first = probes[0].smooth?;
+fn all_smooth<const N: usize>(probes: &[TracedProbe; N]) -> Option<[Smooth; N]> {
+    let first = probes[0].probe.smooth?;
     let mut smooths = [first; N];
     for (smooth, probe) in smooths.iter_mut().zip(probes) {
-        *smooth = probe.smooth?;
+        *smooth = probe.probe.smooth?;
     }
     Some(smooths)
 }
@@ -467,19 +473,19 @@ impl<'a> Interpolation<'a> {
     }
 
     /// The largest difference, in display units, between a cell's probes and what its corners predict of them.
-    fn prediction_error(&self, place: &CellPlace, probes: &[Probe; 9], smooths: &[Smooth; 9]) -> f32 {
-        let corners = Corners::new(CORNERS.map(|k| &probes[k]), CORNERS.map(|k| &smooths[k]));
+    fn prediction_error(&self, place: &CellPlace, probes: &[TracedProbe; 9], smooths: &[Smooth; 9]) -> f32 {
+        let corners = Corners::new(CORNERS.map(|k| &probes[k].probe), CORNERS.map(|k| &smooths[k]));
         let side = f64::from(place.side);
         let errors = MIDDLES.map(|(k, uv)| {
             let raster = DVec2::new(f64::from(place.x), f64::from(place.y)) + side * uv.as_dvec2() + 0.5;
-            display_difference(self.radiance(&corners, uv, raster), probes[k].sample.radiance)
+            probes[k].shown.difference(Shown::new(self.radiance(&corners, uv, raster)))
         });
         errors.into_iter().fold(0.0, f32::max)
     }
 
     /// A pixel of a cell that holds, if a probe was traced for it.
     fn probed(&self, tile: &Tile, place: &CellPlace, pixel: [u32; 2]) -> Option<PixelRecord> {
-        let TracedProbe { probe, misses } = tile.probe(pixel)?;
+        let TracedProbe { probe, misses, .. } = tile.probe(pixel)?;
         let mesh = probe.smooth?.mesh;
         if self.settings.spp > 1 && self.appearance.is_patterned(mesh) {
             return None;
@@ -496,10 +502,11 @@ impl<'a> Interpolation<'a> {
         })
     }
 
-    /// Whether the mean of samples between two pixels differs from either by less than the tolerance, as far as one can tell.
-    fn is_alike(&self, a: &Probe, b: &Probe) -> bool {
-        let difference = display_difference(a.sample.radiance, b.sample.radiance);
-        a.sample.first.mesh == b.sample.first.mesh && difference <= self.settings.tolerance
+    /// Whether samples between two pixels are like those at their centres, as far as one can tell: a pixel reaches half way to the
+    /// next, so that twice the tolerance lies between them. Light that took another way, though in the same colour, tells of
+    /// an edge nearby: without that, `chess` at four samples loses a mirrored line.
+    fn is_alike(&self, a: &TracedProbe, b: &TracedProbe) -> bool {
+        a.probe.trail() == b.probe.trail() && a.shown.difference(b.shown) <= 2.0 * self.settings.tolerance
     }
 
     /// A number for a cell: where it begins, in units of the smallest.

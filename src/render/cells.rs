@@ -4,6 +4,7 @@
 //! its corners, the middles of its sides and its centre, at pixels' centres. Corners and middles on the right and at the
 //! bottom belong to the next cell's pixels, or the next tile's.
 
+use super::follow::Shown;
 use super::integrators::Probe;
 use super::reason::Reason;
 use super::tiles::PixelRect;
@@ -39,6 +40,8 @@ pub(super) enum Cell {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TracedProbe {
     pub probe: Probe,
+    /// The colour that it shows: it is compared with many.
+    pub shown: Shown,
     /// Blocks built for it.
     pub misses: Built,
 }

@@ -54,7 +54,7 @@ pub(super) fn is_surprised(
         let Some(beside) = beside.filter(|b| b.origin == Origin::Traced && b.mesh == here.mesh) else { return false };
         let behind = neighbour(pixel, [-dx, -dy]).and_then(&look);
         let behind = behind.filter(|behind| behind.origin == Origin::Interpolated).unwrap_or(here);
-        let [here, behind, beside] = [here, behind, beside].map(|look| shown(look.color));
+        let [here, behind, beside] = [here, behind, beside].map(|look| Shown::new(look.color).0);
         largest(2.0 * here - behind - beside) > tolerance
     })
 }
@@ -95,13 +95,25 @@ fn neighbour([x, y]: [u32; 2], [dx, dy]: [i32; 2]) -> Option<[u32; 2]> {
     Some([x.checked_add_signed(dx)?, y.checked_add_signed(dy)?])
 }
 
-/// The largest difference between two radiances, in display units.
-pub(super) fn display_difference(a: Vec3, b: Vec3) -> f32 {
-    largest(shown(a) - shown(b))
+/// A colour in display units.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shown(Vec3);
+
+impl Shown {
+    /// What a linear radiance looks like.
+    pub fn new(radiance: Vec3) -> Self {
+        Self(Vec3::from(radiance.to_array().map(display_value)))
+    }
+
+    /// The largest difference of a channel, in display units.
+    pub fn difference(self, other: Self) -> f32 {
+        largest(self.0 - other.0)
+    }
 }
 
-fn shown(radiance: Vec3) -> Vec3 {
-    Vec3::from(radiance.to_array().map(display_value))
+/// The largest difference between two radiances, in display units.
+pub(super) fn display_difference(a: Vec3, b: Vec3) -> f32 {
+    Shown::new(a).difference(Shown::new(b))
 }
 
 fn largest(difference: Vec3) -> f32 {

@@ -23,6 +23,13 @@ pub(in crate::render) struct Probe {
     pub smooth: Option<Smooth>,
 }
 
+impl Probe {
+    /// Equal for samples that show the same mesh in light that took the same way.
+    pub(in crate::render) fn trail(&self) -> Option<(MeshId, u64)> {
+        self.smooth.map(|smooth| (smooth.mesh, smooth.signature))
+    }
+}
+
 /// The smooth parts of a sample of a surface, and its trail.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::render) struct Smooth {
