@@ -138,8 +138,9 @@ pub struct Dicer {
     evaluator: Evaluator,
     /// The points of the part that is diced.
     out: PointGrid,
-    /// A point that is evaluated alone.
-    single: PointGrid,
+    /// Points of a side that has fewer of them than the grid, and the vertices they become.
+    row: PointGrid,
+    side: Vec<[i32; 3]>,
     owner: OwnerScratch,
 }
 
@@ -241,7 +242,13 @@ impl Dicer {
         let at = |along: usize| SidePoint { side, index: first + along as u32, rate: n[axis] };
         let n_points = (last - first + 1) as usize;
         if rates.sides[side] != n[axis] {
-            (0..n_points).for_each(|along| self.snap(surface, patch, rates, at(along), place(along), out));
+            // Its vertices move to points of an edge that has fewer segments than the grid.
+            let index = |along: usize| snapped(first + along as u32, n[axis], rates.sides[side]);
+            self.find_side(surface, patch, rates, side, [index(0), index(n_points - 1)]);
+            for along in 0..n_points {
+                let [i, j] = place(along);
+                out.set(i, j, self.side[(index(along) - index(0)) as usize]);
+            }
             return;
         }
         for start in (0..n_points).step_by(MOST_NEAR) {
@@ -255,28 +262,33 @@ impl Dicer {
         }
     }
 
-    /// Moves a border vertex to a point of an edge that has fewer segments than the grid. `vertex` counts in cells of the
-    /// grid, the last place is where it stands in `out`.
-    fn snap(
+    /// Puts the vertices at the points `first` to `last` of a side, counted in its own segments, into `self.side`.
+    fn find_side(
         &mut self,
         surface: &Surface,
         patch: PatchId,
         rates: &PatchRates,
-        vertex: SidePoint,
-        [i, j]: [usize; 2],
-        out: &mut LatticeGrid,
+        side: usize,
+        [first, last]: [u32; 2],
     ) {
-        let rate = rates.sides[vertex.side];
-        let at = SidePoint { index: snapped(vertex.index, vertex.rate, rate), rate, ..vertex };
-        out.set(i, j, self.snapped_vertex(surface, patch, rates, at));
-    }
-
-    /// The vertex at a point of a side that has fewer segments than the grid.
-    fn snapped_vertex(&mut self, surface: &Surface, patch: PatchId, rates: &PatchRates, at: SidePoint) -> [i32; 3] {
-        let (u, v) = at.uv();
-        match round_point(self.point(surface, patch, u, v)) {
-            (vertex, false) => vertex,
-            _ => self.owner.side_point(surface, patch, rates, at),
+        let (axis, rate) = (side % 2, rates.sides[side]);
+        let lane = self.load(surface, patch);
+        let (points, evaluator, row) = (&mut self.points[lane], &mut self.evaluator, &mut self.row);
+        let along = parameters([first, last], rate);
+        let across = std::iter::once(if side == 1 || side == 2 { 1.0 } else { 0.0 });
+        if axis == 0 {
+            surface.grid(points, evaluator, None, along, across, row);
+        } else {
+            surface.grid(points, evaluator, None, across, along, row);
+        }
+        self.side.clear();
+        for index in first..=last {
+            let k = (index - first) as usize;
+            let [i, j] = if axis == 0 { [k, 0] } else { [0, k] };
+            self.side.push(match round_point(self.row.point(i, j)) {
+                (vertex, false) => vertex,
+                _ => self.owner.side_point(surface, patch, rates, SidePoint { side, index, rate }),
+            });
         }
     }
 
@@ -286,12 +298,6 @@ impl Dicer {
         let lane = patch.idx() % N_REMEMBERED;
         surface.load(patch, &mut self.points[lane]);
         lane
-    }
-
-    fn point(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> [f64; 3] {
-        let lane = self.load(surface, patch);
-        surface.grid(&mut self.points[lane], &mut self.evaluator, None, [u], [v], &mut self.single);
-        self.single.point(0, 0)
     }
 
     /// Position and tangents at a point of a patch, in lattice units without [`LATTICE_SHIFT`].
