@@ -204,20 +204,24 @@ impl<T: Tracer> Worker<'_, '_, T> {
         self.job.is_possible() && !self.footprints.is_crowded()
     }
 
-    /// Traces the pixels that need it, along a Z curve: neighbours hit the same blocks.
+    /// Traces the pixels that need it.
     fn trace_all(&mut self, tile: PixelRect, records: &mut [PixelRecord]) {
-        let along_curve = |k: u32| [tile.x0 + even_bits(k), tile.y0 + even_bits(k >> 1)];
+        self.along_curve(tile, |worker, pixel| {
+            records[tile.idx(pixel).expect("the curve stays in the tile")] = worker.traced(pixel);
+        });
+    }
+
+    /// Goes to every pixel of the largest cells that are not empty, along a Z curve: neighbours hit the same blocks.
+    fn along_curve(&mut self, tile: PixelRect, mut visit: impl FnMut(&mut Self, [u32; 2])) {
+        let place = |k: u32| [tile.x0 + even_bits(k), tile.y0 + even_bits(k >> 1)];
         let per_cell = CELL_SIDES[0].pow(2);
         for first in (0..TILE_SIDE.pow(2)).step_by(per_cell as usize) {
-            let largest = self.tile.place(0, along_curve(first));
+            let largest = self.tile.place(0, place(first));
             if matches!(self.tile.cell(&largest), Cell::Empty | Cell::Undivided) {
                 continue;
             }
-            for pixel in (first..first + per_cell).map(along_curve) {
-                if let Some(idx) = tile.idx(pixel) {
-                    records[idx] = self.traced(pixel);
-                }
-            }
+            let pixels = (first..first + per_cell).map(place);
+            pixels.filter(|&pixel| tile.idx(pixel).is_some()).for_each(|pixel| visit(self, pixel));
         }
     }
 
@@ -342,11 +346,11 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// Traces the first sample of every pixel that is not interpolated.
     fn look_everywhere(&mut self, tile: PixelRect) {
-        for pixel in tile.pixels() {
-            if matches!(self.tile.find(pixel).1, Cell::Split(_)) {
-                self.trace_probe(pixel);
+        self.along_curve(tile, |worker, pixel| {
+            if matches!(worker.tile.find(pixel).1, Cell::Split(_)) {
+                worker.trace_probe(pixel);
             }
-        }
+        });
     }
 
     /// Whether a second sample of a pixel agrees with the first: what is smaller than a pixel, neighbours do not show.
