@@ -44,9 +44,9 @@ pub struct TradeoffArgs {
     /// Width and height in pixels [default: the scene's, or 800x600]
     #[arg(long, value_name = "WxH", value_parser = picture_size, help_heading = PICTURE)]
     pub size: Option<[u32; 2]>,
-    /// Samples per pixel
-    #[arg(long, value_name = "N", value_parser = count, default_value_t = 1, help_heading = PICTURE)]
-    pub spp: u32,
+    /// Samples per pixel [default: the scene's, or 4, as `render` takes; 1 with --thesis]
+    #[arg(long, value_name = "N", value_parser = count, help_heading = PICTURE)]
+    pub spp: Option<u32>,
     /// Integrator [default: the scene's, or whitted]
     #[arg(long, value_name = "NAME", help_heading = PICTURE)]
     pub integrator: Option<IntegratorKind>,
@@ -93,7 +93,8 @@ impl TradeoffArgs {
     fn settings(&self, scene: &SceneDescription) -> Result<RenderSettings> {
         let picture = PictureArgs {
             size: self.size,
-            spp: Some(self.spp),
+            // The published algorithm has one.
+            spp: self.spp.or(self.thesis.then_some(1)),
             integrator: self.integrator,
             rate: None,
             max_depth: None,
