@@ -111,7 +111,7 @@ fn compare(mesh: &ControlMesh, places: Places) -> Option<String> {
                 }
                 let Some(exact) = exact else { continue };
                 surface.load(patch, &mut points);
-                let sample = surface.sample(&points, &mut evaluator, uv[0], uv[1]);
+                let sample = surface.sample(&mut points, &mut evaluator, uv[0], uv[1]);
                 let distance = surface.lattice().to_object(sample.position).distance(exact.position);
                 if distance.is_nan() || distance > tolerance {
                     return Some(format!("face {face}, sub {sub}, uv {uv:?}: {distance} away"));

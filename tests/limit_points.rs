@@ -45,7 +45,7 @@ fn surface_errors(shape: &Shape) -> Errors {
         }
         surface.load(patch, &mut points);
         let sample = |&[u, v]: &[f64; 2]| {
-            let s = surface.sample(&points, &mut evaluator, u, v);
+            let s = surface.sample(&mut points, &mut evaluator, u, v);
             Some(Point { p: surface.lattice().to_object(s.position), du: step * s.du, dv: step * s.dv })
         };
         uvs.iter().map(sample).collect()

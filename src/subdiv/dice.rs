@@ -303,13 +303,13 @@ impl Dicer {
     /// Position and tangents at a point of a patch, in lattice units without [`LATTICE_SHIFT`].
     pub fn sample(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> SurfaceSample {
         let lane = self.load(surface, patch);
-        surface.sample(&self.points[lane], &mut self.evaluator, u, v)
+        surface.sample(&mut self.points[lane], &mut self.evaluator, u, v)
     }
 
     /// The limit normal in object space, not normalised; zero where there is none.
     pub fn normal(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> DVec3 {
         let lane = self.load(surface, patch);
-        surface.normal(&self.points[lane], &mut self.evaluator, u, v)
+        surface.normal(&mut self.points[lane], &mut self.evaluator, u, v)
     }
 
     /// A box that holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing; `depth` more

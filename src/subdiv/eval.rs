@@ -85,7 +85,7 @@ pub enum SampleKind {
 }
 
 /// A point of the limit surface in lattice units.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceSample {
     /// Position.
     pub position: DVec3,
@@ -433,12 +433,29 @@ impl Evaluator {
         simd::run(regular::Positions { control, u, v, out, first: target.first });
     }
 
-    /// Position and tangents at one point.
-    pub fn sample(&mut self, library: &PlanLibrary, node: NodeId, ring: &[Point], u: f64, v: f64) -> SurfaceSample {
-        self.sample_part(library, node, ring, [u, v], 0)
+    /// Position and tangents at one point of a patch whose parts are kept: the same, to the bit, as if they were found anew.
+    pub(super) fn sample_parts(
+        &mut self,
+        library: &PlanLibrary,
+        parts: &mut Parts,
+        [mut u, mut v]: [f64; 2],
+    ) -> SurfaceSample {
+        let (mut part, mut depth) = (0, 0);
+        loop {
+            if let Some(control) = parts.control(part) {
+                return regular_sample(control, u, v, f64::from(depth).exp2());
+            }
+            // A corner may have a limit of its own.
+            let quarters = if exact_corner(u, v).is_some() { None } else { parts.quarters(library, part) };
+            let Some(first) = quarters else {
+                return self.sample_part(library, parts.node(part), parts.points(part), [u, v], depth);
+            };
+            let (k, place) = quarter_at(u, v);
+            (part, depth, [u, v]) = (first + k, depth + 1, place);
+        }
     }
 
-    /// As [`sample`](Self::sample), where the node is `depth` splits below the patch.
+    /// Position and tangents at one point of a node that is `depth` splits below the patch.
     pub(super) fn sample_part(
         &mut self,
         library: &PlanLibrary,
@@ -473,12 +490,11 @@ impl Evaluator {
                     if let (None, Some(Limit::Below(row))) = (position, limit) {
                         position = Some(one_product(library.rows(), row, 0, &self.points[ring..]).to_vec());
                     }
-                    let (x, y) = (f64::from(u8::from(u >= 0.5)), f64::from(u8::from(v >= 0.5)));
-                    let k = exact_corner(x, y).expect("halves are corners");
+                    let (k, place) = quarter_at(u, v);
                     let child = children.get(k);
                     ring = self.refine_child(library, step, &child, ring);
                     node = child.node;
-                    (u, v) = (2.0 * u - x, 2.0 * v - y);
+                    [u, v] = place;
                     scale *= 2.0;
                 }
             }
@@ -522,16 +538,15 @@ pub(super) fn quarters_of(target: &Target, middle: (usize, usize)) -> u32 {
     (0..4).fold(0, |m, k| m | (u32::from(bits[k]) << k))
 }
 
+/// The quarter that a place lies in, and where.
+fn quarter_at(u: f64, v: f64) -> (usize, [f64; 2]) {
+    let (x, y) = (f64::from(u8::from(u >= 0.5)), f64::from(u8::from(v >= 0.5)));
+    (exact_corner(x, y).expect("halves are corners"), [2.0 * u - x, 2.0 * v - y])
+}
+
 fn regular_sample(control: &ControlPoints, u: f64, v: f64, scale: f64) -> SurfaceSample {
-    let (bu, bv) = (regular::basis(u), regular::basis(v));
-    let columns = regular::columns(control, &bv);
-    let columns_dv = regular::columns(control, &regular::basis_derivative(v));
-    SurfaceSample {
-        position: regular::combine(&bu, columns).to_vec(),
-        du: scale * regular::combine(&regular::basis_derivative(u), columns).to_vec(),
-        dv: scale * regular::combine(&bu, columns_dv).to_vec(),
-        kind: SampleKind::Regular,
-    }
+    let [position, du, dv] = simd::run(regular::PointAndTangents { control, u, v }).map(Point::to_vec);
+    SurfaceSample { position, du: scale * du, dv: scale * dv, kind: SampleKind::Regular }
 }
 
 /// Position and tangents of a regular patch.

@@ -54,12 +54,6 @@ impl Parts {
         });
     }
 
-    /// The ring of the patch.
-    pub fn ring(&self, library: &PlanLibrary) -> &[Point] {
-        let n = library.n_points(self.parts[0].node);
-        &self.points[..n]
-    }
-
     /// The node of a part.
     pub fn node(&self, part: usize) -> NodeId {
         self.parts[part].node

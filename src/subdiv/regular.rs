@@ -150,6 +150,28 @@ fn by_axis<K: Kernel>(k: K, c: &ControlPoints) -> [[K::D; 4]; 3] {
     axes
 }
 
+/// Position and derivatives along u and v at one place, by the operations of [`combine`].
+pub(super) struct PointAndTangents<'a> {
+    pub control: &'a ControlPoints,
+    pub u: f64,
+    pub v: f64,
+}
+
+impl Task for PointAndTangents<'_> {
+    type Output = [Point; 3];
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> [Point; 3] {
+        let Self { control, u, v } = self;
+        let along_u = basis(u);
+        let columns = column_lanes(k, control, &basis(v));
+        let columns_dv = column_lanes(k, control, &basis_derivative(v));
+        let point = combine_lanes(k, &along_u, columns);
+        let du = combine_lanes(k, &basis_derivative(u), columns);
+        let dv = combine_lanes(k, &along_u, columns_dv);
+        [Point(k.store4(point)), Point(k.store4(du)), Point(k.store4(dv))]
+    }
+}
+
 /// Positions at all pairs of parameters: point `first + (i, j)` of `out` is at `(u[i], v[j])`. Up to three numbers behind
 /// each row are overwritten.
 pub(super) struct Positions<'a> {
@@ -479,6 +501,16 @@ mod tests {
                     "{side} {a} {b}: {hull:?} {expected:?}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn every_kernel_gives_the_tangents_of_the_plain_sum() {
+        let control = &control_points();
+        for (u, v) in [(0.0, 0.0), (0.3, 0.7), (1.0, 0.1)] {
+            let dv = combine(&basis(u), columns(control, &basis_derivative(v)));
+            let du = combine(&basis_derivative(u), columns(control, &basis(v)));
+            assert_eq!(run(PointAndTangents { control, u, v }), [at(control, u, v), du, dv]);
         }
     }
 

@@ -335,18 +335,18 @@ impl Surface {
     }
 
     /// Position and tangents in lattice units.
-    pub fn sample(&self, points: &PatchPoints, evaluator: &mut Evaluator, u: f64, v: f64) -> SurfaceSample {
+    pub fn sample(&self, points: &mut PatchPoints, evaluator: &mut Evaluator, u: f64, v: f64) -> SurfaceSample {
         if points.node == REGULAR {
             sample_regular(&points.control, u, v)
         } else if let Some(tree) = self.tree(points) {
             evaluator.edited_sample(&self.plans, tree, u, v)
         } else {
-            evaluator.sample(&self.plans, points.node, points.parts.ring(&self.plans), u, v)
+            evaluator.sample_parts(&self.plans, &mut points.parts, [u, v])
         }
     }
 
     /// The limit normal in lattice (and so object) space, along du x dv; zero where there is none.
-    pub fn normal(&self, points: &PatchPoints, evaluator: &mut Evaluator, u: f64, v: f64) -> DVec3 {
+    pub fn normal(&self, points: &mut PatchPoints, evaluator: &mut Evaluator, u: f64, v: f64) -> DVec3 {
         let sample = self.sample(points, evaluator, u, v);
         if sample.kind == SampleKind::PositionOnly { DVec3::ZERO } else { sample.du.cross(sample.dv) }
     }
@@ -500,5 +500,33 @@ mod tests {
             }
         }
         assert!(n_regular > 100, "{n_regular} faces were regular");
+    }
+
+    /// Which parts are known depends on what was asked before, and pictures must not.
+    #[test]
+    fn samples_of_known_parts_are_those_of_a_fresh_walk() {
+        let (mut points, mut evaluator, mut n_irregular) = (PatchPoints::default(), Evaluator::default(), 0);
+        for (name, mesh) in shapes::all() {
+            let surface = Surface::new(&mesh, 1).unwrap();
+            for patch in surface.visible_patches() {
+                surface.load(patch, &mut points);
+                if [REGULAR, EDITED].contains(&points.node) {
+                    continue;
+                }
+                n_irregular += 1;
+                let ring = points.parts.points(0).to_vec();
+                let eighths = (0..81).map(|k| [k % 9, k / 9].map(|i| f64::from(i) / 8.0));
+                let beside = eighths.clone().map(|place| place.map(|t| 0.999 * t));
+                for place in eighths.chain(beside) {
+                    let sample = evaluator.sample_parts(&surface.plans, &mut points.parts, place);
+                    let expected = match points.parts.control(0) {
+                        Some(control) => sample_regular(control, place[0], place[1]),
+                        None => evaluator.sample_part(&surface.plans, points.parts.node(0), &ring, place, 0),
+                    };
+                    assert_eq!(sample, expected, "{name}, {patch:?}, {place:?}");
+                }
+            }
+        }
+        assert!(n_irregular > 100, "{n_irregular} irregular patches");
     }
 }

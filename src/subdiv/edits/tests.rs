@@ -26,7 +26,7 @@ fn assert_same_surface(mesh: &ControlMesh) -> usize {
             let hidden = !surface.is_visible(patch) || surface.edited().hide_point(patch, *u, *v);
             assert_eq!(exact.is_none(), hidden, "face {face}, sub {sub}, ({u}, {v})");
             let Some(exact) = exact else { continue };
-            let sample = surface.sample(&points, &mut evaluator, *u, *v);
+            let sample = surface.sample(&mut points, &mut evaluator, *u, *v);
             let distance = surface.lattice().to_object(sample.position).distance(exact.position);
             assert!(distance < 2e-6, "face {face}, sub {sub}, ({u}, {v}): {distance} away");
             if let Tangents::Derivatives(du, dv) = exact.tangents {
