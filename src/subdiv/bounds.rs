@@ -3,7 +3,7 @@
 use super::eval::{Evaluator, Point, quarter};
 use super::parts::Parts;
 use super::plan::{NodeId, Plan, PlanLibrary, Step};
-use super::pole::{self, PoleHull};
+use super::pole::{self, MOST_REFINED, PoleHull};
 use super::products::control_points;
 use super::regular::{self, BezierWeights, ControlPoints, GridHulls, MOST_PARTS, bezier_weights};
 use super::rows::Width;
@@ -79,7 +79,7 @@ impl Evaluator {
         if depth == 0 && matches!(library.plan(node), Plan::Split { in_hull: true, .. }) {
             return parts.points(part).iter().for_each(|p| bounds.grow(p.to_vec()));
         }
-        if let (WHOLE, Some([low, high])) = ([u, v], pole_hull(library, node, parts.points(part), depth)) {
+        if let (WHOLE, Some([low, high])) = ([u, v], self.pole_hull(library, node, parts.points(part), depth)) {
             bounds.grow(low.to_vec());
             bounds.grow(high.to_vec());
             return;
@@ -240,19 +240,31 @@ impl Evaluator {
     }
 }
 
-/// The box around a whole pole, if the node is one that has no more points than there is room for.
-fn pole_hull(library: &PlanLibrary, node: NodeId, ring: &[Point], depth: u32) -> Option<[Point; 2]> {
-    let Plan::Split { step: Step { pole: Some(order), .. }, in_hull: true, .. } = library.plan(node) else {
-        return None;
-    };
-    if depth == 0 || order.len() > pole::MOST_POINTS {
-        return None;
+impl Evaluator {
+    /// The box around a whole pole, if the node is one that has no more points than there is room for.
+    fn pole_hull(&mut self, library: &PlanLibrary, node: NodeId, points: &[Point], depth: u32) -> Option<[Point; 2]> {
+        let Plan::Split { step: Step { pole: Some(order), .. }, in_hull: true, .. } = library.plan(node) else {
+            return None;
+        };
+        if depth == 0 || order.len() > pole::MOST_POINTS {
+            return None;
+        }
+        let (store, scratch) = (library.rows(), &mut *self.pole_points.0);
+        Some(match store.widths() {
+            Width::Narrow(indices) => simd::run(PoleHull { points, ring: store.list(order, indices), depth, scratch }),
+            Width::Wide(indices) => simd::run(PoleHull { points, ring: store.list(order, indices), depth, scratch }),
+        })
     }
-    let store = library.rows();
-    Some(match store.widths() {
-        Width::Narrow(indices) => simd::run(PoleHull { points: ring, ring: store.list(order, indices), depth }),
-        Width::Wide(indices) => simd::run(PoleHull { points: ring, ring: store.list(order, indices), depth }),
-    })
+}
+
+/// Room for the points of a pole: 4 KiB, too many to be cleared for every box.
+#[derive(Debug)]
+pub(super) struct PolePoints(Box<[[Point; MOST_REFINED]; 2]>);
+
+impl Default for PolePoints {
+    fn default() -> Self {
+        Self(Box::new([[Point::ZERO; MOST_REFINED]; 2]))
+    }
 }
 
 /// The part of a parameter range that lies in the lower (0) or upper (1) half, as the half sees it. Where a range only

@@ -1,6 +1,6 @@
 //! Walking down plans: grids of points, and single samples with tangents.
 
-use super::bounds::HullWeights;
+use super::bounds::{HullWeights, PolePoints};
 use super::parts::Parts;
 use super::plan::{Child, Children, Limit, Limits, NodeId, Plan, PlanLibrary, Step};
 use super::products::{child_points, control_points, one_product, refined_points};
@@ -110,6 +110,7 @@ pub struct Evaluator {
     /// Parameters of all levels, a stack.
     params: Vec<f64>,
     pub(super) hulls: HullWeights,
+    pub(super) pole_points: PolePoints,
     /// How many splits below the patch its parts have the cells that stencils are for, if the grid has such parts.
     stencil_depth: Option<u32>,
 }

@@ -203,6 +203,9 @@ impl<I: Index> Task for PoleStep<'_, I> {
 /// Points of a ring that [`PoleHull`] has room for: an apex of 24 edges.
 pub(super) const MOST_POINTS: usize = 1 + 2 * 24 + N_OUTER;
 
+/// Refined points of a ring of [`MOST_POINTS`].
+pub(super) const MOST_REFINED: usize = MOST_POINTS + N_BEYOND;
+
 /// The numbers of points that are in a pole's order.
 pub(super) const IN_ORDER: [u8; MOST_POINTS] = {
     let mut order = [0; MOST_POINTS];
@@ -221,6 +224,8 @@ pub(super) struct PoleHull<'a, I> {
     /// See [`PoleStep`].
     pub ring: &'a [I],
     pub depth: u32,
+    /// Room for the refined points of two levels.
+    pub scratch: &'a mut [[Point; MOST_REFINED]; 2],
 }
 
 /// The control points of the regular quarters among the refined points of a pole with `n` faces around its apex.
@@ -261,8 +266,7 @@ impl<I: Index> Task for PoleHull<'_, I> {
     fn run<K: Kernel>(self, k: K) -> [Point; 2] {
         let (n_ring, n_refined) = (self.ring.len(), self.ring.len() + N_BEYOND);
         let quarters = regular_quarters((n_ring - 1 - N_OUTER) / 2);
-        let mut buffers = [[Point::ZERO; MOST_POINTS + N_BEYOND]; 2];
-        let [mut refined, mut before] = buffers.each_mut();
+        let [mut refined, mut before] = self.scratch.each_mut();
         let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
         for level in 0..self.depth {
             match level {
