@@ -387,52 +387,46 @@ fn single([x, y]: [u32; 2]) -> PixelRect {
 impl<T> Worker<'_, '_, T> {
     /// Whether a cell whose probes are traced can be interpolated.
     fn judge(&mut self, place: &CellPlace) -> Cell {
-        let pixels = place.probe_pixels();
-        let probes = pixels.map(|pixel| *self.tile.probe(pixel).expect("all probes of a judged cell are traced"));
+        let Self { job, tile, footprints, .. } = self;
+        let probes = place.probe_pixels().map(|pixel| tile.probe(pixel).expect("a judged cell has all its probes"));
         let Some(smooths) = all_smooth(&probes) else { return Cell::Split(Reason::Silhouette) };
         if let Some(reason) = first_difference(&smooths) {
             return Cell::Split(reason);
         }
-        let error = self.job.prediction_error(place, &probes, &smooths);
+        let error = job.prediction_error(place, &probes, &smooths);
         // Footprints last: they take longest.
-        match error <= self.job.settings.tolerance {
+        match error <= job.settings.tolerance {
             false => Cell::Split(Reason::Contradiction),
-            true if self.is_connected(place, &probes, &smooths) => Cell::Holds { error },
+            true if is_connected(footprints, place, &probes, smooths[0].outside) => Cell::Holds { error },
             true => Cell::Split(Reason::Hidden),
         }
     }
-
-    fn is_connected<const N: usize>(
-        &mut self,
-        place: &CellPlace,
-        probes: &[TracedProbe; N],
-        smooths: &[Smooth; N],
-    ) -> bool {
-        let mut hits: Vec<_> = Vec::with_capacity(N);
-        for first in probes.iter().map(|p| p.probe.sample.first) {
-            let hit = (MeshId(first.mesh), PatchId(first.patch));
-            if !hits.contains(&hit) {
-                hits.push(hit);
-            }
-        }
-        let farthest = probes.iter().fold(0.0, |far: f32, p| far.max(p.probe.sample.first.depth));
-        let claim = Claim { hits: &hits, outside: smooths[0].outside, farthest };
-        self.footprints.agree(place.pixels(), &claim)
-    }
 }
 
-fn all_smooth<const N: usize>(probes: &[TracedProbe; N]) -> Option<[Smooth; N]> {
-    let first = probes[0].probe.smooth?;
-    let mut smooths = [first; N];
+/// Whether nothing but one piece of surface, that of the probes, is seen in a cell.
+fn is_connected(footprints: &mut Footprints<'_>, place: &CellPlace, probes: &[&TracedProbe], outside: bool) -> bool {
+    let mut hits: Vec<_> = Vec::with_capacity(probes.len());
+    for first in probes.iter().map(|p| p.probe.sample.first) {
+        let hit = (MeshId(first.mesh), PatchId(first.patch));
+        if !hits.contains(&hit) {
+            hits.push(hit);
+        }
+    }
+    let farthest = probes.iter().fold(0.0, |far: f32, p| far.max(p.probe.sample.first.depth));
+    footprints.agree(place.pixels(), &Claim { hits: &hits, outside, farthest })
+}
+
+fn all_smooth<'p, const N: usize>(probes: &[&'p TracedProbe; N]) -> Option<[&'p Smooth; N]> {
+    let mut smooths = [probes[0].probe.smooth.as_ref()?; N];
     for (smooth, probe) in smooths.iter_mut().zip(probes) {
-        *smooth = probe.probe.smooth?;
+        *smooth = probe.probe.smooth.as_ref()?;
     }
     Some(smooths)
 }
 
 /// What keeps probes from being of one smooth surface in the same light.
-fn first_difference(smooths: &[Smooth]) -> Option<Reason> {
-    let first = &smooths[0];
+fn first_difference(smooths: &[&Smooth]) -> Option<Reason> {
+    let first = smooths[0];
     if smooths.iter().any(|s| (s.mesh, s.outside) != (first.mesh, first.outside)) {
         return Some(Reason::Silhouette);
     }
@@ -447,7 +441,7 @@ fn first_difference(smooths: &[Smooth]) -> Option<Reason> {
     if same_way { None } else { Some(Reason::Reflection) }
 }
 
-fn all_lights(smooths: &[Smooth]) -> LightMasks {
+fn all_lights(smooths: &[&Smooth]) -> LightMasks {
     smooths.iter().fold(LightMasks::default(), |all, s| all | s.lights)
 }
 
@@ -477,8 +471,8 @@ impl<'a> Interpolation<'a> {
     }
 
     /// The largest difference, in display units, between a cell's probes and what its corners predict of them.
-    fn prediction_error(&self, place: &CellPlace, probes: &[TracedProbe; 9], smooths: &[Smooth; 9]) -> f32 {
-        let corners = Corners::new(CORNERS.map(|k| &probes[k].probe), CORNERS.map(|k| &smooths[k]));
+    fn prediction_error(&self, place: &CellPlace, probes: &[&TracedProbe; 9], smooths: &[&Smooth; 9]) -> f32 {
+        let corners = Corners::new(CORNERS.map(|k| &probes[k].probe), CORNERS.map(|k| smooths[k]));
         let side = f64::from(place.side);
         let errors = MIDDLES.map(|(k, uv)| {
             let raster = DVec2::new(f64::from(place.x), f64::from(place.y)) + side * uv.as_dvec2() + 0.5;

@@ -80,9 +80,8 @@ impl Canvas {
 
     fn surprises_of(&self, tile: PixelRect, tolerance: f32) -> Surprises {
         let is_beyond = |pixel| tile.idx(pixel).is_none();
-        let at_seam = |x: u32, y: u32| x == tile.x0 || x + 1 == tile.x1 || y == tile.y0 || y + 1 == tile.y1;
-        let pixels = tile.pixels().filter(|&[x, y]| at_seam(x, y));
-        let pixels = pixels.filter(|&pixel| is_surprised(pixel, tolerance, is_beyond, |pixel| self.look(pixel)));
+        let pixels =
+            at_seams(tile).filter(|&pixel| is_surprised(pixel, tolerance, is_beyond, |pixel| self.look(pixel)));
         Surprises { tile, pixels: pixels.collect() }
     }
 
@@ -105,6 +104,13 @@ impl Canvas {
     fn idx(&self, pixel: [u32; 2]) -> usize {
         self.film.window().idx(pixel).expect("the pixel lies in the canvas")
     }
+}
+
+/// The outermost pixels of a tile; where it is one pixel high, twice.
+fn at_seams(PixelRect { x0, y0, x1, y1 }: PixelRect) -> impl Iterator<Item = [u32; 2]> {
+    let rows = [y0, y1 - 1].into_iter().flat_map(move |y| (x0..x1).map(move |x| [x, y]));
+    let columns = (y0 + 1..y1 - 1).flat_map(move |y| [[x0, y], [x1 - 1, y]]);
+    rows.chain(columns)
 }
 
 fn has(bits: &[u64], idx: usize) -> bool {
