@@ -17,10 +17,6 @@ use glam::Vec3;
 /// Steps to the pixels beside one.
 const AROUND: [[i32; 2]; 8] = [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
 
-/// How far from a pixel that contradicts others are traced. What is about a pixel thin comes and goes: with 1 instead of 2, 2 %
-/// fewer rays are traced on trex, and gaps of a pixel end a line.
-const REACH: i32 = 2;
-
 /// How a pixel got its colour, as far as edges are concerned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Origin {
@@ -79,16 +75,21 @@ pub(super) fn beside_traced(tile: PixelRect, origins: impl Iterator<Item = Origi
     tile.pixels().filter(is_beside)
 }
 
-/// Goes on from each of the `waiting` pixels. `trace` traces one if it is interpolated, and then says whether it contradicts.
-pub(super) fn follow(area: PixelRect, mut waiting: Vec<[u32; 2]>, mut trace: impl FnMut([u32; 2]) -> bool) {
+/// Goes on from each of the `waiting` pixels, up to `reach` pixels from one that contradicts. `trace` traces one if it is not
+/// traced yet, and then says whether it contradicts.
+pub(super) fn follow(area: PixelRect, reach: i32, mut waiting: Vec<[u32; 2]>, mut trace: impl FnMut([u32; 2]) -> bool) {
     while let Some(pixel) = waiting.pop() {
         if trace(pixel) {
-            let side = 2 * REACH + 1;
-            let steps = (0..side * side).map(|k| [k % side - REACH, k / side - REACH]);
-            let around = steps.filter_map(|step| neighbour(pixel, step));
-            waiting.extend(around.filter(|&pixel| area.idx(pixel).is_some()));
+            waiting.extend(around(area, pixel, reach));
         }
     }
+}
+
+/// The pixels of an area up to `reach` from one, and that one.
+pub(super) fn around(area: PixelRect, pixel: [u32; 2], reach: i32) -> impl Iterator<Item = [u32; 2]> {
+    let side = 2 * reach + 1;
+    let steps = (0..side * side).map(move |k| [k % side - reach, k / side - reach]);
+    steps.filter_map(move |step| neighbour(pixel, step)).filter(move |&pixel| area.idx(pixel).is_some())
 }
 
 fn neighbour([x, y]: [u32; 2], [dx, dy]: [i32; 2]) -> Option<[u32; 2]> {
@@ -145,7 +146,7 @@ mod tests {
         let surprised: Vec<_> = AREA.pixels().filter(|&pixel| is_surprised(pixel, 0.1, |_| true, look)).collect();
         assert_eq!(surprised, [[13, 21], [13, 22], [13, 23]]);
         let mut traced = Vec::new();
-        follow(AREA, surprised, |pixel| {
+        follow(AREA, 2, surprised, |pixel| {
             let is_new = at(pixel) != b'W' && at(pixel) != b'T' && !traced.contains(&pixel);
             if is_new {
                 traced.push(pixel);

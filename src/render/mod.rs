@@ -43,6 +43,7 @@ mod projection;
 pub mod rays;
 pub mod reason;
 pub mod sampler;
+mod samples;
 pub mod settings;
 pub mod thesis;
 pub mod tiles;
