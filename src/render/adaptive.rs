@@ -148,7 +148,7 @@ impl Outcome {
     }
 }
 
-/// Renders tiles; its means are also those of [`samples`](super::samples).
+/// Renders tiles. How many samples its pixels take is told in `samples`.
 pub(super) struct Worker<'j, 's, T> {
     pub(super) job: &'j Interpolation<'j>,
     footprints: Footprints<'j>,
