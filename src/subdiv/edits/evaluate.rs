@@ -40,7 +40,7 @@ impl Evaluator {
         }
     }
 
-    /// As [`sample_parts`](Self::sample_parts) for a patch under edits.
+    /// Position and tangents at one point of a patch under edits.
     pub fn edited_sample(&mut self, library: &PlanLibrary, tree: &EditTree, u: f64, v: f64) -> SurfaceSample {
         let (mut tree, mut u, mut v, mut depth) = (tree, u, v, 0);
         loop {
