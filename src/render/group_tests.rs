@@ -334,7 +334,10 @@ fn what_is_thin_and_ends_between_probes_is_found_along_its_length() {
             let [a, b] = [&full, &grouped].map(display);
             let missed = [(&a, &b), (&b, &a)].map(|(a, b)| missed_objects(size[0] as usize, a, b));
             assert_eq!(missed, [0, 0], "{thickness} at {tolerance}, {spp} samples");
-            assert!(share_above(&full, &grouped, tolerance) < 5e-4, "{thickness} at {tolerance}, {spp} samples");
+            assert!(
+                share_above(&full, &grouped, tolerance) < if spp == 1 { 3e-4 } else { 5e-4 },
+                "{thickness} at {tolerance}, {spp} samples"
+            );
         }
     }
 }
