@@ -9,9 +9,9 @@ use std::path::Path;
 /// Writes `a.png`, grey, and `b.png`, the same with one white pixel.
 fn pictures(folder: &Path) {
     let mut pixels = vec![[0.5; 3]; 40 * 30];
-    write_png(&folder.join("a.png"), 40, &pixels).unwrap();
+    write_png(&folder.join("a.png"), 40, pixels.iter().copied()).unwrap();
     pixels[15 * 40 + 20] = [1.0; 3];
-    write_png(&folder.join("b.png"), 40, &pixels).unwrap();
+    write_png(&folder.join("b.png"), 40, pixels).unwrap();
 }
 
 fn compare(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
@@ -61,7 +61,7 @@ fn the_heat_map_is_yellow_where_the_pictures_differ() {
 fn wrong_input_gets_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     pictures(folder.path());
-    write_png(&folder.path().join("small.png"), 4, &[[0.5; 3]; 8]).unwrap();
+    write_png(&folder.path().join("small.png"), 4, [[0.5; 3]; 8]).unwrap();
     std::fs::write(folder.path().join("text.png"), "no picture").unwrap();
     let says = |arguments: &[&str], sentence: &str| {
         compare(folder.path(), arguments).code(2).stdout("").stderr(predicate::str::contains(sentence));

@@ -45,8 +45,8 @@ impl CompareArgs {
     fn write_heat_map(&self, map: &DifferenceMap) -> Result<()> {
         let Some(path) = &self.diff else { return Ok(()) };
         let full_scale = self.max.filter(|&e| e > 0.0).unwrap_or_else(|| map.max());
-        let pixels: Vec<_> = map.heat_map(full_scale).into_iter().map(|pixel| pixel.map(display_value)).collect();
-        write_png(path, map.width(), &pixels)
+        let pixels = map.heat_map(full_scale).into_iter().map(|pixel| pixel.map(display_value));
+        write_png(path, map.width(), pixels)
     }
 
     fn judge(&self, comparison: &Comparison, map: &DifferenceMap) -> Result<()> {

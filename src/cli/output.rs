@@ -3,7 +3,7 @@
 use super::render::PictureFormat;
 use crate::error::Result;
 use crate::image::color_map::viridis;
-use crate::image::display::display_value;
+use crate::image::display::{display_pixels, display_value};
 use crate::io::exr::write_exr;
 use crate::io::picture::{ChannelData, ImageLayers, Layer};
 use crate::io::png::write_png;
@@ -33,8 +33,7 @@ pub fn write_film(path: &Path, format: PictureFormat, film: &Film) -> Result<()>
     match format {
         PictureFormat::Exr => write_exr(path, &layers(film)),
         PictureFormat::Png => {
-            let pixels: Vec<[f32; 3]> = film.colors().iter().map(|c| c.map(display_value)).collect();
-            write_png(path, film.window().width() as usize, &pixels)?;
+            write_png(path, film.window().width() as usize, display_pixels(film.colors()))?;
             film.planes().iter().try_for_each(|(aov, plane)| write_plane(path, film, *aov, plane))
         }
     }
@@ -53,7 +52,7 @@ fn write_plane(path: &Path, film: &Film, aov: Aov, plane: &PlaneData) -> Result<
         PlaneData::Float(channels) => error_colors(&channels[0]),
     };
     let name = aov.channels().1[0];
-    write_png(&beside(path, name), film.window().width() as usize, &pixels)
+    write_png(&beside(path, name), film.window().width() as usize, pixels)
 }
 
 fn beside(path: &Path, name: &str) -> PathBuf {

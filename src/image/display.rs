@@ -31,7 +31,7 @@ impl<'a> LinearImage<'a> {
 
     /// Display values of every pixel.
     pub fn to_display(&self) -> Vec<[f32; 3]> {
-        self.pixels.iter().map(|pixel| pixel.map(display_value)).collect()
+        display_pixels(self.pixels).collect()
     }
 }
 
@@ -40,10 +40,22 @@ pub fn display_value(linear: f32) -> f32 {
     if linear.is_nan() { 0.0 } else { srgb_from_linear(linear.clamp(0.0, 1.0)) }
 }
 
+/// The display values of pixels. Those that look like the one before, as a background does, are found once.
+pub fn display_pixels(linear: &[[f32; 3]]) -> impl Iterator<Item = [f32; 3]> {
+    let mut last = ([0.0; 3], [0.0; 3]);
+    linear.iter().map(move |&pixel| {
+        if pixel != last.0 {
+            last = (pixel, pixel.map(display_value));
+        }
+        last.1
+    })
+}
+
 /// The sRGB transfer function, from linear to encoded, for 0..=1.
 pub fn srgb_from_linear(linear: f32) -> f32 {
-    // In f32, 1.055 - 0.055 is less than 1: white would not be white.
-    let curve = || (1.055 * f64::from(linear).powf(1.0 / 2.4) - 0.055) as f32;
+    // The power in f32, a third of the work in f64, is good to 1e-7. But in f32, 1.055 - 0.055 is less than 1: white would not
+    // be white.
+    let curve = || (1.055 * f64::from(linear.powf(1.0 / 2.4)) - 0.055) as f32;
     if linear <= 0.003_130_8 { 12.92 * linear } else { curve() }
 }
 
@@ -62,12 +74,23 @@ mod tests {
             assert!((srgb_from_linear(linear) - encoded).abs() < 1e-5, "{linear}");
             assert!((linear_from_srgb(encoded) - linear).abs() < 1e-5, "{encoded}");
         }
+        for linear in (0..=10_000).map(|i| i as f32 / 1e4).filter(|&linear| linear > 0.003_130_8) {
+            let exact = 1.055 * f64::from(linear).powf(1.0 / 2.4) - 0.055;
+            assert!((f64::from(srgb_from_linear(linear)) - exact).abs() < 1e-7, "{linear}");
+        }
     }
 
     #[test]
     fn what_a_screen_cannot_show_is_clamped() {
         let shown = [-1.0, f32::NAN, 7.0, f32::INFINITY, f32::NEG_INFINITY].map(display_value);
         assert_eq!(shown, [0.0, 0.0, 1.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn pixels_are_shown_one_by_one_whatever_comes_before_them() {
+        let linear = [[0.0; 3], [0.2, 0.4, 2.0], [0.2, 0.4, 2.0], [f32::NAN; 3], [f32::NAN; 3], [0.2, 0.4, 2.0], [1.0; 3]];
+        let shown: Vec<_> = display_pixels(&linear).collect();
+        assert_eq!(shown, linear.map(|pixel| pixel.map(display_value)));
     }
 
     #[test]

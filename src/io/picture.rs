@@ -99,7 +99,7 @@ mod tests {
     fn small_files() -> [Vec<u8>; 2] {
         let folder = tempfile::tempdir().unwrap();
         let (png, exr) = (folder.path().join("a.png"), folder.path().join("a.exr"));
-        png::write_png(&png, 5, &[[0.25, 0.5, 1.0]; 20]).unwrap();
+        png::write_png(&png, 5, [[0.25, 0.5, 1.0]; 20]).unwrap();
         let channel = |name: &str| (name.to_owned(), ChannelData::F32(vec![0.5; 20]));
         let layer = Layer { name: String::new(), channels: ["R", "G", "B"].map(channel).into(), half: true };
         exr::write_exr(&exr, &ImageLayers { width: 5, height: 4, layers: vec![layer] }).unwrap();

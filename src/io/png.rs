@@ -4,7 +4,7 @@ use super::picture::{RgbPicture, check_size};
 use super::write::write_whole;
 use crate::error::Result;
 use ::png::{
-    BitDepth, ColorType, Decoder, Encoder, EncodingError, Limits, ScaledFloat, SrgbRenderingIntent, Transformations,
+    BitDepth, ColorType, Compression, Decoder, Encoder, EncodingError, Limits, ScaledFloat, SrgbRenderingIntent, Transformations,
 };
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
@@ -15,24 +15,25 @@ use std::path::Path;
 ///
 /// # Panics
 /// If the pixels do not make whole rows of `width`.
-pub fn write_png(path: &Path, width: usize, pixels: &[[f32; 3]]) -> Result<()> {
-    assert!(width > 0 && pixels.len().is_multiple_of(width), "{} pixels in rows of {width}", pixels.len());
-    let bytes: Vec<u8> = pixels.iter().flatten().map(|&v| quantise(v)).collect();
+pub fn write_png(path: &Path, width: usize, pixels: impl IntoIterator<Item = [f32; 3]>) -> Result<()> {
+    let bytes: Vec<[u8; 3]> = pixels.into_iter().map(|pixel| pixel.map(quantise)).collect();
+    assert!(width > 0 && bytes.len().is_multiple_of(width), "{} pixels in rows of {width}", bytes.len());
     write_whole(path, |out| {
-        let mut encoder = Encoder::new(out, width as u32, (pixels.len() / width) as u32);
+        let mut encoder = Encoder::new(out, width as u32, (bytes.len() / width) as u32);
         encoder.set_color(ColorType::Rgb);
         encoder.set_depth(BitDepth::Eight);
         encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
         // What the specification wants beside sRGB, in units of 1e-5.
         encoder.set_source_gamma(ScaledFloat::from_scaled(45455));
+        encoder.set_compression(Compression::Fast);
         let mut writer = encoder.write_header().map_err(io_error)?;
-        writer.write_image_data(&bytes).map_err(io_error)?;
+        writer.write_image_data(bytes.as_flattened()).map_err(io_error)?;
         writer.finish().map_err(io_error)
     })
 }
 
 fn quantise(value: f32) -> u8 {
-    (value.clamp(0.0, 1.0) * 255.0).round() as u8
+    (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
 fn io_error(error: EncodingError) -> io::Error {
@@ -87,7 +88,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         let pixels = [[0.0, 0.5, 1.0], [0.04, 7.0, -1.0], [f32::NAN, 0.2, 0.8], [1.0, 1.0, 1.0]];
-        write_png(&path, 2, &pixels).unwrap();
+        write_png(&path, 2, pixels).unwrap();
         let back = read_rgb(&path).unwrap();
         assert_eq!((back.width, back.height), (2, 2));
         for (written, read) in pixels.iter().flatten().zip(back.pixels.iter().flatten()) {
@@ -101,7 +102,7 @@ mod tests {
     fn file_says_that_it_is_srgb() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        write_png(&path, 1, &[[0.5; 3]]).unwrap();
+        write_png(&path, 1, [[0.5; 3]]).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         for chunk in [b"sRGB", b"gAMA"] {
             assert!(bytes.windows(4).any(|w| w == chunk));

@@ -37,7 +37,7 @@ use super::sampler::subpixel;
 use super::settings::{Appearance, RenderSettings, RunSettings};
 use super::tiles::PixelRect;
 use super::tracer::{Built, Tracer};
-use super::workers::{GroupSeconds, PixelTracer, Rendered, TileQueue, in_threads, render};
+use super::workers::{Exposure, GroupSeconds, PixelTracer, Rendered, TileQueue, in_threads, render};
 use crate::ids::{MeshId, PatchId};
 use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
@@ -244,7 +244,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
             let record = &mut records[tile.idx(pixel).expect("edges are followed within the tile")];
             let expected = Vec3::from(record.color);
             look(record, spp).origin == Origin::Interpolated && {
-                *record = self.followed(pixel);
+                let exposure = self.first_sample(pixel);
+                *record = self.followed(pixel, expected, exposure);
                 display_difference(expected, Vec3::from(record.color)) > edge
             }
         });
@@ -255,7 +256,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         let Surprises { tile, pixels } = surprises;
         follow(*tile, REACH, pixels.clone(), |pixel| {
             let Some(expected) = canvas.lock().interpolated(pixel) else { return false };
-            let record = self.followed(pixel);
+            let record = self.followed(pixel, expected, Exposure::default());
             canvas.lock().correct(pixel, &record);
             if self.job.settings.window.idx(pixel).is_some() {
                 self.outcome.pixels.add(record.reason, 1);
@@ -264,9 +265,13 @@ impl<T: Tracer> Worker<'_, '_, T> {
         });
     }
 
-    /// All samples of a pixel that an edge may reach.
-    fn followed(&mut self, pixel: [u32; 2]) -> PixelRecord {
-        PixelRecord { reason: Reason::Neighbour, ..self.job.pixels().trace(&mut self.shader, pixel) }
+    /// A pixel that an edge may reach and whose group expects a colour, after the samples of `exposure`: two samples if they
+    /// bear the group out, else all.
+    fn followed(&mut self, pixel: [u32; 2], expected: Vec3, mut exposure: Exposure) -> PixelRecord {
+        if !self.bears_out(pixel, expected, &mut exposure) {
+            self.job.pixels().expose(&mut self.shader, pixel, &mut exposure, self.job.settings.spp);
+        }
+        PixelRecord { reason: Reason::Neighbour, ..exposure.record() }
     }
 
     /// For integrators whose samples are random, and crowds of patches: what no patch reaches is known all the same.

@@ -45,13 +45,14 @@ pub(super) fn is_surprised(
     look: impl Fn([u32; 2]) -> Option<Look>,
 ) -> bool {
     let Some(here) = look(pixel).filter(|here| here.origin == Origin::Interpolated) else { return false };
+    let shown_here = Shown::new(here.color).0;
     AROUND.into_iter().any(|[dx, dy]| {
         let beside = neighbour(pixel, [dx, dy]).filter(|&beside| counts(beside)).and_then(&look);
         let Some(beside) = beside.filter(|b| b.origin == Origin::Traced && b.mesh == here.mesh) else { return false };
         let behind = neighbour(pixel, [-dx, -dy]).and_then(&look);
-        let behind = behind.filter(|behind| behind.origin == Origin::Interpolated).unwrap_or(here);
-        let [here, behind, beside] = [here, behind, beside].map(|look| Shown::new(look.color).0);
-        largest(2.0 * here - behind - beside) > tolerance
+        let behind = behind.filter(|behind| behind.origin == Origin::Interpolated);
+        let shown_behind = behind.map_or(shown_here, |behind| Shown::new(behind.color).0);
+        largest(2.0 * shown_here - shown_behind - Shown::new(beside.color).0) > tolerance
     })
 }
 

@@ -17,6 +17,7 @@ use super::follow::{around, display_difference, follow};
 use super::tiles::PixelRect;
 use super::tracer::Tracer;
 use super::workers::Exposure;
+use glam::Vec3;
 
 /// Samples of a settled pixel.
 const SETTLED: u32 = 2;
@@ -70,7 +71,15 @@ impl<T: Tracer> Worker<'_, '_, T> {
         self.contradicting.clear();
     }
 
-    fn first_sample(&self, pixel: [u32; 2]) -> Exposure {
+    /// Traces two samples of a pixel that has more; whether they are alike and show the colour that was expected.
+    pub(super) fn bears_out(&mut self, pixel: [u32; 2], expected: Vec3, exposure: &mut Exposure) -> bool {
+        self.job.settings.spp > SETTLED
+            && self.is_confirmed(pixel, exposure)
+            && display_difference(expected, exposure.mean()) <= 0.5 * self.job.edge()
+    }
+
+    /// The first sample of a pixel of the tile, if it was traced.
+    pub(super) fn first_sample(&self, pixel: [u32; 2]) -> Exposure {
         self.tile.probe(pixel).map_or(Exposure::default(), |p| Exposure::new(&p.probe.sample, p.misses))
     }
 
