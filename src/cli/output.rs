@@ -13,7 +13,7 @@ use crate::render::sampler::pcg;
 use std::path::{Path, PathBuf};
 
 /// Display colours of reasons, by number: greys where nothing was found out, hues of edges, dark where nothing was traced.
-const REASON_COLORS: [[f32; 3]; 12] = [
+const REASON_COLORS: [[f32; 3]; 13] = [
     [0.65, 0.65, 0.65],
     [1.0, 1.0, 1.0],
     [0.85, 0.85, 0.7],
@@ -26,6 +26,7 @@ const REASON_COLORS: [[f32; 3]; 12] = [
     [0.6, 0.4, 0.2],
     [0.12, 0.3, 0.15],
     [0.0, 0.0, 0.0],
+    [0.55, 0.8, 0.3],
 ];
 
 /// Writes a film whole, or leaves the file that was there.

@@ -88,7 +88,8 @@ mod tests {
 
     #[test]
     fn pixels_are_shown_one_by_one_whatever_comes_before_them() {
-        let linear = [[0.0; 3], [0.2, 0.4, 2.0], [0.2, 0.4, 2.0], [f32::NAN; 3], [f32::NAN; 3], [0.2, 0.4, 2.0], [1.0; 3]];
+        let linear =
+            [[0.0; 3], [0.2, 0.4, 2.0], [0.2, 0.4, 2.0], [f32::NAN; 3], [f32::NAN; 3], [0.2, 0.4, 2.0], [1.0; 3]];
         let shown: Vec<_> = display_pixels(&linear).collect();
         assert_eq!(shown, linear.map(|pixel| pixel.map(display_value)));
     }

@@ -4,7 +4,8 @@ use super::picture::{RgbPicture, check_size};
 use super::write::write_whole;
 use crate::error::Result;
 use ::png::{
-    BitDepth, ColorType, Compression, Decoder, Encoder, EncodingError, Limits, ScaledFloat, SrgbRenderingIntent, Transformations,
+    BitDepth, ColorType, Compression, Decoder, Encoder, EncodingError, Limits, ScaledFloat, SrgbRenderingIntent,
+    Transformations,
 };
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;

@@ -9,7 +9,8 @@
 //! What is interpolated is not colour but what varies smoothly (depth, normal, light from reflections), from the four
 //! nearest probes; direct light is then computed again for the pixel, so that highlights and patterns stay sharp. The four
 //! nearest are twice as close as those that the prediction was checked with, which for a smooth function makes the error
-//! a quarter of the one that was measured.
+//! a quarter of the one that was measured. Where the surface is may be in doubt by as much as depths of probes were off; a
+//! pixel with the edge of a pattern in that reach is traced.
 //!
 //! What may be where is known from footprints; of shadows and mirror images they know nothing. These are followed (`follow`)
 //! from traced pixels into the cells that hold, within a tile and, once all tiles are there, across their seams (`canvas`).
@@ -42,7 +43,7 @@ use crate::ids::{MeshId, PatchId};
 use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
 use crate::scene::world::World;
-use glam::{DVec2, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use parking_lot::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -57,6 +58,13 @@ const MAX_EDGE: f32 = 0.01;
 /// How far from a pixel that contradicts others are traced. What is about a pixel thin comes and goes: with 1 instead of 2, 2 %
 /// fewer rays are traced on trex, and gaps of a pixel end a line.
 const REACH: i32 = 2;
+
+/// How much further from the interpolation a surface may be than it was where that was checked, as far as patterns are concerned:
+/// facets have kinks. With 1, one pixel in a thousand pictures of small patterns had a sample on the wrong square.
+const DOUBTS: f32 = 2.0;
+
+/// What rounding makes of an interpolated depth, relative to it: probes have it in single precision.
+const DEPTH_ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// The corners among a cell's nine probes, in the order (0,0), (1,0), (1,1), (0,1), and the others with their places.
 const CORNERS: [usize; 4] = [0, 2, 8, 6];
@@ -245,7 +253,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
             let expected = Vec3::from(record.color);
             look(record, spp).origin == Origin::Interpolated && {
                 let exposure = self.first_sample(pixel);
-                *record = self.followed(pixel, expected, exposure);
+                *record = self.followed(pixel, exposure);
                 display_difference(expected, Vec3::from(record.color)) > edge
             }
         });
@@ -256,7 +264,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         let Surprises { tile, pixels } = surprises;
         follow(*tile, REACH, pixels.clone(), |pixel| {
             let Some(expected) = canvas.lock().interpolated(pixel) else { return false };
-            let record = self.followed(pixel, expected, Exposure::default());
+            let record = self.followed(pixel, Exposure::default());
             canvas.lock().correct(pixel, &record);
             if self.job.settings.window.idx(pixel).is_some() {
                 self.outcome.pixels.add(record.reason, 1);
@@ -265,12 +273,9 @@ impl<T: Tracer> Worker<'_, '_, T> {
         });
     }
 
-    /// A pixel that an edge may reach and whose group expects a colour, after the samples of `exposure`: two samples if they
-    /// bear the group out, else all.
-    fn followed(&mut self, pixel: [u32; 2], expected: Vec3, mut exposure: Exposure) -> PixelRecord {
-        if !self.bears_out(pixel, expected, &mut exposure) {
-            self.job.pixels().expose(&mut self.shader, pixel, &mut exposure, self.job.settings.spp);
-        }
+    /// A pixel that an edge may reach: all samples after those of `exposure`.
+    fn followed(&mut self, pixel: [u32; 2], mut exposure: Exposure) -> PixelRecord {
+        self.job.pixels().expose(&mut self.shader, pixel, &mut exposure, self.job.settings.spp);
         PixelRecord { reason: Reason::Neighbour, ..exposure.record() }
     }
 
@@ -331,9 +336,16 @@ impl<T: Tracer> Worker<'_, '_, T> {
             Cell::Undivided | Cell::Empty => return background,
             // A probe of a smaller cell beside this one had no say here: it is judged like any pixel.
             Cell::Holds { .. } if self.tile.probe(pixel).is_some() && !place.has_probe(pixel) => Reason::Neighbour,
-            Cell::Holds { .. } => {
-                return interpolation.probed(&self.tile, &place, pixel).unwrap_or(background.interpolated());
-            }
+            Cell::Holds { depth, .. } => match interpolation.probed(&self.tile, &place, pixel) {
+                Some(record) => return record,
+                None if interpolation.may_show_edge_of_pattern(&self.tile, &place, pixel, depth) => {
+                    return PixelRecord {
+                        reason: Reason::Pattern,
+                        ..interpolation.pixels().trace(&mut self.shader, pixel)
+                    };
+                }
+                None => return background.interpolated(),
+            },
             Cell::Split(_) if self.footprints.is_empty(single(pixel)) => return background,
             Cell::Split(reason) => reason,
         };
@@ -365,11 +377,11 @@ impl<T> Worker<'_, '_, T> {
         if let Some(reason) = first_difference(&smooths) {
             return Cell::Split(reason);
         }
-        let error = job.prediction_error(place, &probes, &smooths);
+        let Errors { color, depth } = job.prediction_errors(place, &probes, &smooths);
         // Footprints last: they take longest.
-        match error <= job.settings.tolerance {
+        match color <= job.settings.tolerance {
             false => Cell::Split(Reason::Contradiction),
-            true if is_connected(footprints, place, &probes, smooths[0].outside) => Cell::Holds { error },
+            true if is_connected(footprints, place, &probes, smooths[0].outside) => Cell::Holds { error: color, depth },
             true => Cell::Split(Reason::Hidden),
         }
     }
@@ -420,7 +432,7 @@ fn all_lights(smooths: &[&Smooth]) -> LightMasks {
 /// Turns probes into pixels; knows no tracer.
 pub(super) struct Interpolation<'a> {
     camera: &'a Camera,
-    appearance: &'a Appearance,
+    pub(super) appearance: &'a Appearance,
     pub(super) settings: &'a RenderSettings,
 }
 
@@ -442,15 +454,19 @@ impl<'a> Interpolation<'a> {
         PixelTracer { camera: self.camera, settings: self.settings }
     }
 
-    /// The largest difference, in display units, between a cell's probes and what its corners predict of them.
-    fn prediction_error(&self, place: &CellPlace, probes: &[&TracedProbe; 9], smooths: &[&Smooth; 9]) -> f32 {
+    /// The largest differences between a cell's probes and what its corners predict of them.
+    fn prediction_errors(&self, place: &CellPlace, probes: &[&TracedProbe; 9], smooths: &[&Smooth; 9]) -> Errors {
         let corners = Corners::new(CORNERS.map(|k| &probes[k].probe), CORNERS.map(|k| smooths[k]));
         let side = f64::from(place.side);
-        let errors = MIDDLES.map(|(k, uv)| {
+        let mut errors = Errors { color: 0.0, depth: 0.0 };
+        for (k, uv) in MIDDLES {
             let raster = DVec2::new(f64::from(place.x), f64::from(place.y)) + side * uv.as_dvec2() + 0.5;
-            probes[k].shown.difference(Shown::new(self.radiance(&corners, uv, raster)))
-        });
-        errors.into_iter().fold(0.0, f32::max)
+            let expected = Shown::new(self.radiance(&corners, uv, raster));
+            errors.color = errors.color.max(probes[k].shown.difference(expected));
+            let depth = 1.0 / corners.inverse_depth(bilinear_weights(uv));
+            errors.depth = errors.depth.max((depth - 1.0 / smooths[k].inverse_depth).abs());
+        }
+        errors
     }
 
     /// A pixel of a cell that holds, if a probe was traced for it.
@@ -481,27 +497,51 @@ impl<'a> Interpolation<'a> {
     /// A pixel of a cell that holds, from the four nearest probes.
     fn pixel(&self, tile: &Tile, pixel: [u32; 2]) -> PixelRecord {
         let (place, cell) = tile.find(pixel);
-        let half = place.side / 2;
-        let [x, y] = pixel.map(|n| n - n % half);
-        let nearest = [[x, y], [x + half, y], [x + half, y + half], [x, y + half]];
-        let probes = nearest.map(|p| &tile.probe(p).expect("a cell that holds has all its probes").probe);
-        let smooths = probes.map(|p| p.smooth.as_ref().expect("a cell that holds shows surface everywhere"));
-        let corners = Corners::new(probes, smooths);
-        let place_in =
-            |raster: DVec2| ((raster - 0.5 - DVec2::new(f64::from(x), f64::from(y))) / f64::from(half)).as_vec2();
-        let n = if self.appearance.is_patterned(smooths[0].mesh) { self.settings.spp } else { 1 };
-        let rasters = (0..n).map(|i| DVec2::from(pixel.map(f64::from)) + subpixel(i));
-        let sum: Vec3 = rasters.map(|raster| self.radiance(&corners, place_in(raster), raster)).sum();
-        let error = if let Cell::Holds { error } = cell { error } else { 0.0 };
+        let nearest = Nearest::new(tile, &place, pixel);
+        let rasters = self.rasters(&nearest.corners, pixel);
+        let n = rasters.len() as f32;
+        let sum: Vec3 = rasters.map(|raster| self.radiance(&nearest.corners, nearest.place(raster), raster)).sum();
+        let error = if let Cell::Holds { error, .. } = cell { error } else { 0.0 };
         PixelRecord {
-            color: (sum / n as f32).to_array(),
+            color: (sum / n).to_array(),
             samples: 0,
-            first: corners.first_hit(place_in(DVec2::from(pixel.map(f64::from)) + 0.5)),
+            first: nearest.corners.first_hit(nearest.place(DVec2::from(pixel.map(f64::from)) + 0.5)),
             misses: Built::default(),
             group: self.group(&place),
             reason: Reason::Interpolated,
             error,
         }
+    }
+
+    /// Where a pixel of a cell that holds is interpolated: several times where a pattern may be finer than it.
+    fn rasters(&self, corners: &Corners<'_>, pixel: [u32; 2]) -> impl ExactSizeIterator<Item = DVec2> + use<> {
+        let n = if self.appearance.is_patterned(corners.mesh()) { self.settings.spp } else { 1 };
+        (0..n).map(move |i| DVec2::from(pixel.map(f64::from)) + subpixel(i))
+    }
+
+    /// Whether some sample of a pixel of a cell that holds lies so near the edge of a pattern that it may be beyond: the ray is
+    /// known, and how far along it the surface is only up to `doubt`, a depth. Where colours themselves are interpolated, those of
+    /// the probes have to be of the same square.
+    fn may_show_edge_of_pattern(&self, tile: &Tile, place: &CellPlace, pixel: [u32; 2], doubt: f32) -> bool {
+        let nearest = Nearest::new(tile, place, pixel);
+        let corners = &nearest.corners;
+        if !self.appearance.is_patterned(corners.mesh()) {
+            return false;
+        }
+        let probes = nearest.rasters();
+        let is_mixed = |position: DVec3| {
+            !self.appearance.can_reshade()
+                && probes.iter().zip(corners.smooths).any(|(&raster, smooth)| {
+                    let probe = self.position(raster, smooth.inverse_depth).0;
+                    !self.appearance.has_one_color(corners.mesh(), position, probe)
+                })
+        };
+        self.rasters(corners, pixel).any(|raster| {
+            let inverse_depth = corners.inverse_depth(bilinear_weights(nearest.place(raster)));
+            let (position, along) = self.position(raster, inverse_depth);
+            let doubt = f64::from(DOUBTS * doubt + DEPTH_ROUNDING / inverse_depth) * along;
+            !self.appearance.has_one_color(corners.mesh(), position - doubt, position + doubt) || is_mixed(position)
+        })
     }
 
     /// Radiance at (u, v) between four probes, seen at `raster`.
@@ -510,22 +550,67 @@ impl<'a> Interpolation<'a> {
         if !self.appearance.can_reshade() {
             return corners.mix(weights, |probe, _| probe.sample.radiance);
         }
-        let direction = self.camera.ray(raster, self.settings.size).direction;
-        let depth = 1.0 / f64::from(corners.inverse_depth(weights));
+        let (position, along) = self.position(raster, corners.inverse_depth(weights));
         let point = SmoothPoint {
-            mesh: corners.smooths[0].mesh,
-            position: self.camera.eye() + depth / direction.dot(self.camera.forward()) * direction,
+            mesh: corners.mesh(),
+            position,
             normal: corners.normal(weights),
-            to_eye: -direction.as_vec3(),
+            to_eye: -along.normalize().as_vec3(),
             blocked: corners.blocked,
         };
         self.appearance.local_radiance(&point) + corners.mix(weights, |_, smooth| smooth.secondary)
+    }
+
+    /// The point of world space that is seen at `raster` so deep, and the way that the ray goes in a unit of depth.
+    pub(super) fn position(&self, raster: DVec2, inverse_depth: f32) -> (DVec3, DVec3) {
+        let direction = self.camera.ray(raster, self.settings.size).direction;
+        let along = direction / direction.dot(self.camera.forward());
+        (self.camera.eye() + along / f64::from(inverse_depth), along)
     }
 }
 
 fn bilinear_weights(uv: Vec2) -> [f32; 4] {
     let (u, v) = (uv.x, uv.y);
     [(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v]
+}
+
+/// How far probes are from what others predict: in display units, and in depth along the camera's forward direction.
+struct Errors {
+    color: f32,
+    depth: f32,
+}
+
+/// The four probes nearest to a pixel of a cell that holds.
+struct Nearest<'p> {
+    corners: Corners<'p>,
+    /// The pixel of the first, and how far apart they are.
+    origin: DVec2,
+    side: f64,
+}
+
+impl<'p> Nearest<'p> {
+    fn new(tile: &'p Tile, place: &CellPlace, pixel: [u32; 2]) -> Self {
+        let half = place.side / 2;
+        let [x, y] = pixel.map(|n| n - n % half);
+        let nearest = [[x, y], [x + half, y], [x + half, y + half], [x, y + half]];
+        let probes = nearest.map(|p| &tile.probe(p).expect("a cell that holds has all its probes").probe);
+        let smooths = probes.map(|p| p.smooth.as_ref().expect("a cell that holds shows surface everywhere"));
+        Self {
+            corners: Corners::new(probes, smooths),
+            origin: DVec2::new(f64::from(x), f64::from(y)),
+            side: f64::from(half),
+        }
+    }
+
+    /// Where they are in the picture.
+    fn rasters(&self) -> [DVec2; 4] {
+        [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y].map(|uv| self.origin + self.side * uv + 0.5)
+    }
+
+    /// Where a place of the picture lies between them.
+    fn place(&self, raster: DVec2) -> Vec2 {
+        ((raster - 0.5 - self.origin) / self.side).as_vec2()
+    }
 }
 
 /// Four probes that span a square, in the order (0,0), (1,0), (1,1), (0,1).
@@ -539,6 +624,10 @@ impl<'p> Corners<'p> {
     fn new(probes: [&'p Probe; 4], smooths: [&'p Smooth; 4]) -> Self {
         let blocked = smooths.iter().fold(0, |all, s| all | s.lights.blocked);
         Self { probes, smooths, blocked }
+    }
+
+    fn mesh(&self) -> MeshId {
+        self.smooths[0].mesh
     }
 
     fn mix(&self, weights: [f32; 4], value: impl Fn(&Probe, &Smooth) -> Vec3) -> Vec3 {

@@ -123,7 +123,8 @@ pub(super) fn look(record: &PixelRecord, spp: u32) -> Look {
         Reason::Interpolated => Origin::Interpolated,
         // One sample alone may have missed an edge.
         Reason::Corner | Reason::Probe if spp > 1 => Origin::Interpolated,
-        Reason::Background | Reason::Corner | Reason::Probe => Origin::Other,
+        // The edges of patterns are known.
+        Reason::Background | Reason::Corner | Reason::Probe | Reason::Pattern => Origin::Other,
         _ => Origin::Traced,
     };
     Look { origin, color: Vec3::from(record.color), mesh: record.first.mesh }

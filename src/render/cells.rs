@@ -30,8 +30,8 @@ pub(super) enum Cell {
     Undivided,
     /// No patch reaches it.
     Empty,
-    /// Its interpolation holds: probes differ from it by at most `error` display units.
-    Holds { error: f32 },
+    /// Its interpolation holds: probes differ from it by at most `error` display units, and by `depth` in depth.
+    Holds { error: f32, depth: f32 },
     /// It does not, for this reason.
     Split(Reason),
 }
@@ -108,9 +108,10 @@ impl Tile {
         self.traced.get(usize::from(self.places[self.probe_idx(pixel)]))
     }
 
-    /// Whether a pixel is one of the tile's.
-    pub fn has(&self, [x, y]: [u32; 2]) -> bool {
-        x.wrapping_sub(self.origin[0]) < TILE_SIDE && y.wrapping_sub(self.origin[1]) < TILE_SIDE
+    /// The tile's pixels, whole even where the picture ends.
+    pub fn area(&self) -> PixelRect {
+        let [x0, y0] = self.origin;
+        PixelRect { x0, y0, x1: x0 + TILE_SIDE, y1: y0 + TILE_SIDE }
     }
 
     pub fn set_probe(&mut self, pixel: [u32; 2], probe: TracedProbe) {
@@ -200,8 +201,9 @@ mod tests {
     fn edges_split_the_cells_beside_them() {
         let mut tile = Tile::new([200, 200]);
         tile.reset([64, 128]);
+        let holds = Cell::Holds { error: 0.0, depth: 0.0 };
         for place in tile.cells_to_judge(0) {
-            tile.set_cell(&place, Cell::Holds { error: 0.0 });
+            tile.set_cell(&place, holds);
         }
         let edge = tile.place(0, [64, 128]);
         tile.set_cell(&edge, Cell::Split(Reason::Shadow));
@@ -209,7 +211,7 @@ mod tests {
         let side = CELL_SIDES[0];
         let cells: Vec<_> =
             [[64, 128], [64 + side, 128 + side], [64 + 2 * side, 128]].map(|p| tile.cell(&tile.place(0, p))).into();
-        assert_eq!(cells, [Cell::Split(Reason::Shadow), Cell::Split(Reason::Neighbour), Cell::Holds { error: 0.0 }]);
+        assert_eq!(cells, [Cell::Split(Reason::Shadow), Cell::Split(Reason::Neighbour), holds]);
     }
 
     #[test]

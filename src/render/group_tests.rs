@@ -18,6 +18,7 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 use parking_lot::Mutex;
 use std::sync::atomic::AtomicBool;
 
+mod edges;
 mod fuzz;
 
 /// Meshes with materials, lights, and a camera.

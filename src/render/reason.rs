@@ -32,11 +32,13 @@ pub enum Reason {
     Interpolated,
     /// Not traced: no patch reaches the pixel.
     Background,
+    /// Traced: the edge of a pattern is nearer than the group's positions are sure.
+    Pattern,
 }
 
 impl Reason {
     /// Every reason with its name in statistics, by number.
-    pub const ALL: [(&'static str, Self); 12] = [
+    pub const ALL: [(&'static str, Self); 13] = [
         ("every", Self::Every),
         ("corner", Self::Corner),
         ("probe", Self::Probe),
@@ -49,6 +51,7 @@ impl Reason {
         ("neighbour", Self::Neighbour),
         ("interpolated", Self::Interpolated),
         ("background", Self::Background),
+        ("pattern", Self::Pattern),
     ];
 
     /// Whether rays were traced for the pixel.
@@ -124,6 +127,6 @@ mod tests {
     fn only_traced_pixels_count_as_traced() {
         let mut counts = PixelCounts::default();
         Reason::ALL.iter().for_each(|&(_, reason)| counts.add(reason, 1));
-        assert_eq!(counts.traced(), 10);
+        assert_eq!(counts.traced(), 11);
     }
 }

@@ -3,8 +3,9 @@
 //! Of every pixel that is not interpolated the first sample is traced, before any other. Where it is **even** with those
 //! around it, in colour and in the way that its light took, a second one decides: if that agrees, the pixel is **settled**
 //! with two. All others take every sample. What is thinner than a pixel may lie between the first two samples of some pixels
-//! along it, but not of all: where all samples of a pixel contradict its first two, the settled pixels beside it take every
-//! sample as well, and so on along the line, as edges are followed into groups.
+//! along it, but not of all: where all samples of a pixel contradict its first, or its first two, the settled pixels beside it
+//! take every sample as well, and so on along the line, as edges are followed into groups. Patterns are looked up: nothing is
+//! settled where one of their edges passes.
 //!
 //! # Invariants
 //! 1. A settled pixel has two samples, any other traced one has all, bit for bit those that it has without groups.
@@ -17,7 +18,7 @@ use super::follow::{around, display_difference, follow};
 use super::tiles::PixelRect;
 use super::tracer::Tracer;
 use super::workers::Exposure;
-use glam::Vec3;
+use glam::DVec2;
 
 /// Samples of a settled pixel.
 const SETTLED: u32 = 2;
@@ -71,25 +72,20 @@ impl<T: Tracer> Worker<'_, '_, T> {
         self.contradicting.clear();
     }
 
-    /// Traces two samples of a pixel that has more; whether they are alike and show the colour that was expected.
-    pub(super) fn bears_out(&mut self, pixel: [u32; 2], expected: Vec3, exposure: &mut Exposure) -> bool {
-        self.job.settings.spp > SETTLED
-            && self.is_confirmed(pixel, exposure)
-            && display_difference(expected, exposure.mean()) <= 0.5 * self.job.edge()
-    }
-
     /// The first sample of a pixel of the tile, if it was traced.
     pub(super) fn first_sample(&self, pixel: [u32; 2]) -> Exposure {
         self.tile.probe(pixel).map_or(Exposure::default(), |p| Exposure::new(&p.probe.sample, p.misses))
     }
 
-    /// Traces the rest of a pixel's samples; whether all of them contradict the first two.
+    /// Traces the rest of a pixel's samples; whether all of them contradict the first, or the first two. (Of an edge that two of
+    /// four samples lie beyond, the first two may be one on each side.)
     fn complete(&mut self, pixel: [u32; 2], exposure: &mut Exposure) -> bool {
         let (pixels, spp) = (self.job.pixels(), self.job.settings.spp);
+        let first = self.first_sample(pixel).mean();
         pixels.expose(&mut self.shader, pixel, exposure, SETTLED);
-        let first = exposure.mean();
+        let two = exposure.mean();
         pixels.expose(&mut self.shader, pixel, exposure, spp);
-        display_difference(first, exposure.mean()) > 0.5 * self.job.edge()
+        [first, two].iter().any(|&mean| display_difference(mean, exposure.mean()) > 0.5 * self.job.edge())
     }
 
     /// Traces a second sample of a pixel; whether it agrees with the first: what is smaller than a pixel, neighbours do not show.
@@ -100,16 +96,33 @@ impl<T: Tracer> Worker<'_, '_, T> {
     }
 
     /// Whether a traced pixel and those around it, all of the tile, are alike.
-    fn is_even(&self, [x, y]: [u32; 2]) -> bool {
-        let Some(own) = self.tile.probe([x, y]) else { return false };
-        let around = (0..9).map(|k| [(x + k % 3).checked_sub(1), (y + k / 3).checked_sub(1)]);
-        around.into_iter().all(|place| match place {
-            [Some(x), Some(y)] if self.tile.has([x, y]) => match (self.tile.probe([x, y]), self.tile.find([x, y]).1) {
-                (Some(other), _) => self.is_alike(own, other),
-                (None, cell) => matches!(cell, Cell::Holds { .. }),
-            },
-            _ => false,
-        })
+    fn is_even(&self, pixel: [u32; 2]) -> bool {
+        // What reaches a pixel and was not seen in it is thin: samples that miss cost little.
+        let Some(own) = self.tile.probe(pixel).filter(|own| own.probe.smooth.is_some()) else { return false };
+        let is_alike = |beside| match self.tile.probe(beside) {
+            Some(other) => self.is_alike(own, other),
+            None => matches!(self.tile.find(beside).1, Cell::Holds { .. }),
+        };
+        let area = self.tile.area();
+        around(area, pixel, 1).count() == 9
+            && around(area, pixel, 1).all(is_alike)
+            && self.shows_no_edge_of_pattern(pixel, own)
+    }
+
+    /// Whether the centres of a traced pixel and of those around it, between which its samples lie, are all on one square of a
+    /// pattern, or on a mesh that has none.
+    fn shows_no_edge_of_pattern(&self, pixel: [u32; 2], own: &TracedProbe) -> bool {
+        let Some(mesh) = own.probe.smooth.map(|smooth| smooth.mesh) else { return true };
+        let position = |pixel: [u32; 2]| {
+            let smooth = self.tile.probe(pixel)?.probe.smooth?;
+            let center = DVec2::from(pixel.map(f64::from)) + 0.5;
+            Some(self.job.position(center, smooth.inverse_depth).0)
+        };
+        let has_one_color = |beside| {
+            let ends = position(pixel).zip(position(beside));
+            ends.is_some_and(|(from, to)| self.job.appearance.has_one_color(mesh, from, to))
+        };
+        !self.job.appearance.is_patterned(mesh) || around(self.tile.area(), pixel, 1).all(has_one_color)
     }
 
     /// Whether samples between two pixels are like those at their centres, as far as one can tell: a pixel reaches half way to

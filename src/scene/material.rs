@@ -5,12 +5,20 @@ use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 
 impl Albedo {
+    /// The cube of a checker that a point of world space lies in, by its lowest corner in cubes; zero where there is one colour.
+    pub fn cube_at(&self, position: DVec3) -> DVec3 {
+        match *self {
+            Self::Constant(_) => DVec3::ZERO,
+            Self::Checker { size, .. } => (position / size).floor(),
+        }
+    }
+
     /// The colour at a point of world space.
     pub fn at(&self, position: DVec3) -> Vec3 {
         match *self {
             Self::Constant(colour) => colour,
-            Self::Checker { even, odd, size } => {
-                let cube = (position / size).floor();
+            Self::Checker { even, odd, .. } => {
+                let cube = self.cube_at(position);
                 // Parity by arithmetic, as cells may lie beyond the range of integers.
                 if (cube.x + cube.y + cube.z).rem_euclid(2.0) < 1.0 { even } else { odd }
             }
@@ -114,6 +122,16 @@ mod tests {
         assert_eq!(checker.at(DVec3::splat(0.5)), Vec3::ONE);
         assert_eq!(checker.at(DVec3::new(-0.5, 0.5, 0.5)), Vec3::ZERO);
         assert_eq!(checker.at(DVec3::new(-0.5, 0.5, 2.5)), Vec3::ONE);
+    }
+
+    #[test]
+    fn cubes_are_told_apart_though_their_colours_are_alike() {
+        let checker = Albedo::Checker { even: Vec3::ONE, odd: Vec3::ZERO, size: 2.0 };
+        assert_eq!(checker.cube_at(DVec3::new(1.9, 0.5, -0.5)), DVec3::new(0.0, 0.0, -1.0));
+        let [a, b] = [DVec3::splat(0.5), DVec3::new(2.5, 2.5, 0.5)];
+        assert_eq!(checker.at(a), checker.at(b));
+        assert_ne!(checker.cube_at(a), checker.cube_at(b));
+        assert_eq!(Albedo::Constant(Vec3::ONE).cube_at(a), Albedo::Constant(Vec3::ONE).cube_at(b));
     }
 
     #[test]

@@ -72,7 +72,7 @@ impl Numbers {
     }
 }
 
-fn unit_cube(bounds: DBounds) -> DAffine3 {
+pub(super) fn unit_cube(bounds: DBounds) -> DAffine3 {
     let size = (bounds.max - bounds.min).max_element().max(1e-9);
     DAffine3::from_scale(DVec3::splat(2.0 / size)) * DAffine3::from_translation(-bounds.center())
 }

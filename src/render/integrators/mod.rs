@@ -94,6 +94,9 @@ impl<'a, T: Tracer> Shader<'a, T> {
         let hit = hit?;
         let point = self.tracer.surface_point(ray, &hit);
         let material = &self.appearance.materials[hit.primitive.mesh.idx()];
+        if kind != RayKind::Shadow {
+            self.trail.note_cube(material.diffuse.cube_at(point.position));
+        }
         Some(Interaction::new(ray, hit, point, material))
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! A [`Probe`] is a sample with its **smooth** parts: normal, inverse depth (linear over the picture on a plane), light
 //! that came by reflection or refraction. Its **trail** tells which way the light took: lights that were blocked, meshes
-//! that secondary rays hit. Between probes with the same trail the smooth parts can be interpolated and shaded again,
-//! without a ray.
+//! that secondary rays hit, and where on their patterns. Between probes with the same trail the smooth parts can be
+//! interpolated and shaded again, without a ray.
 
 use super::{Sample, Shader};
 use crate::ids::MeshId;
@@ -43,7 +43,7 @@ pub(in crate::render) struct Smooth {
     /// Radiance that did not come from a light directly.
     pub secondary: Vec3,
     pub lights: LightMasks,
-    /// Equal for samples whose secondary rays hit the same meshes and had the same lights.
+    /// Equal for samples whose secondary rays hit the same meshes, on the same cube of a pattern, and had the same lights.
     pub signature: u64,
 }
 
@@ -105,6 +105,13 @@ impl Trail {
         self.mix(hit.map_or(u64::MAX, |hit| u64::from(hit.primitive.mesh.0)));
     }
 
+    /// Where a pattern was seen: the edges of its cubes are as sharp as those of meshes.
+    pub fn note_cube(&mut self, cube: DVec3) {
+        if cube != DVec3::ZERO {
+            cube.to_array().into_iter().for_each(|x| self.mix(x.to_bits()));
+        }
+    }
+
     pub fn note_light(&mut self, number: usize, state: LightState) {
         let bit = 1 << (number % LightMasks::CAPACITY);
         match state {
@@ -158,6 +165,12 @@ impl Appearance {
     /// Whether a mesh's colour changes faster than pixels may notice.
     pub(in crate::render) fn is_patterned(&self, mesh: MeshId) -> bool {
         matches!(self.materials[mesh.idx()].diffuse, Albedo::Checker { .. })
+    }
+
+    /// Whether a mesh has one colour all along a short way through world space.
+    pub(in crate::render) fn has_one_color(&self, mesh: MeshId, from: DVec3, to: DVec3) -> bool {
+        let diffuse = self.materials[mesh.idx()].diffuse;
+        diffuse.cube_at(from) == diffuse.cube_at(to)
     }
 
     /// Radiance of direct light and skies.
