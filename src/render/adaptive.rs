@@ -520,27 +520,29 @@ impl<'a> Interpolation<'a> {
     }
 
     /// Whether some sample of a pixel of a cell that holds lies so near the edge of a pattern that it may be beyond: the ray is
-    /// known, and how far along it the surface is only up to `doubt`, a depth. Where colours themselves are interpolated, those of
-    /// the probes have to be of the same square.
+    /// known, and how far along it the surface is only as well as the probes' tangent planes agree with the interpolation, and
+    /// not better than `DOUBTS` times `doubt`, a depth. Where colours themselves are interpolated, those of the probes have to be
+    /// of the same square.
     fn may_show_edge_of_pattern(&self, tile: &Tile, place: &CellPlace, pixel: [u32; 2], doubt: f32) -> bool {
         let nearest = Nearest::new(tile, place, pixel);
         let corners = &nearest.corners;
         if !self.appearance.is_patterned(corners.mesh()) {
             return false;
         }
-        let probes = nearest.rasters();
-        let is_mixed = |position: DVec3| {
-            !self.appearance.can_reshade()
-                && probes.iter().zip(corners.smooths).any(|(&raster, smooth)| {
-                    let probe = self.position(raster, smooth.inverse_depth).0;
-                    !self.appearance.has_one_color(corners.mesh(), position, probe)
-                })
-        };
+        let has_one_color = |from, to| self.appearance.has_one_color(corners.mesh(), from, to);
+        let probes: [(DVec3, DVec3); 4] = std::array::from_fn(|k| {
+            let smooth = corners.smooths[k];
+            (self.position(nearest.rasters()[k], smooth.inverse_depth).0, smooth.normal.as_dvec3())
+        });
+        let is_mixed =
+            |position| !self.appearance.can_reshade() && probes.iter().any(|probe| !has_one_color(position, probe.0));
         self.rasters(corners, pixel).any(|raster| {
             let inverse_depth = corners.inverse_depth(bilinear_weights(nearest.place(raster)));
             let (position, along) = self.position(raster, inverse_depth);
-            let doubt = f64::from(DOUBTS * doubt + DEPTH_ROUNDING / inverse_depth) * along;
-            !self.appearance.has_one_color(corners.mesh(), position - doubt, position + doubt) || is_mixed(position)
+            let to_plane = |(probe, normal): &(DVec3, DVec3)| (*probe - position).dot(*normal) / along.dot(*normal);
+            let least = f64::from(DOUBTS * doubt + DEPTH_ROUNDING / inverse_depth);
+            let reach = probes.iter().map(|probe| to_plane(probe).abs()).fold(least, f64::max) * along;
+            !has_one_color(position - reach, position + reach) || is_mixed(position)
         })
     }
 

@@ -337,9 +337,9 @@ impl Dicer {
                 _ => (i[0] == 0, rates.n_v, j),
             };
             let rate = rates.sides[side];
-            let t = snap(along, n, rate);
-            let own = range(along, n);
-            if touches && rate < n && (t[0] < own[0] || t[1] > own[1]) {
+            let (own, t) = (range(along, n), snap(along, n, rate));
+            // What of the side lies within the cells' own parameters is in their box already.
+            if touches && (t[0] < own[0] || t[1] > own[1]) {
                 let t = [if t[0] < own[0] { t[0] } else { own[1] }, if t[1] > own[1] { t[1] } else { own[0] }];
                 let (u, v) = match side {
                     0 => (t, [0.0; 2]),
