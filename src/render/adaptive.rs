@@ -9,8 +9,8 @@
 //! What is interpolated is not colour but what varies smoothly (depth, normal, light from reflections), from the four
 //! nearest probes; direct light is then computed again for the pixel, so that highlights and patterns stay sharp. The four
 //! nearest are twice as close as those that the prediction was checked with, which for a smooth function makes the error
-//! a quarter of the one that was measured. Where the surface is may be in doubt by as much as depths of probes were off; a
-//! pixel with the edge of a pattern in that reach is traced.
+//! a quarter of the one that was measured. Where the surface is may be in doubt by as much as depths of probes were off, or
+//! their tangent planes disagree; a pixel with the edge of a pattern in that reach is traced.
 //!
 //! What may be where is known from footprints; of shadows and mirror images they know nothing. These are followed (`follow`)
 //! from traced pixels into the cells that hold, within a tile and, once all tiles are there, across their seams (`canvas`).
@@ -60,7 +60,7 @@ const MAX_EDGE: f32 = 0.01;
 const REACH: i32 = 2;
 
 /// How much further from the interpolation a surface may be than it was where that was checked, as far as patterns are concerned:
-/// facets have kinks. With 1, one pixel in a thousand pictures of small patterns had a sample on the wrong square.
+/// facets have kinks. With 1, a globe of the tests had a sample on the wrong square.
 const DOUBTS: f32 = 2.0;
 
 /// What rounding makes of an interpolated depth, relative to it: probes have it in single precision.
@@ -530,9 +530,10 @@ impl<'a> Interpolation<'a> {
             return false;
         }
         let has_one_color = |from, to| self.appearance.has_one_color(corners.mesh(), from, to);
+        let rasters = nearest.rasters();
         let probes: [(DVec3, DVec3); 4] = std::array::from_fn(|k| {
             let smooth = corners.smooths[k];
-            (self.position(nearest.rasters()[k], smooth.inverse_depth).0, smooth.normal.as_dvec3())
+            (self.position(rasters[k], smooth.inverse_depth).0, smooth.normal.as_dvec3())
         });
         let is_mixed =
             |position| !self.appearance.can_reshade() && probes.iter().any(|probe| !has_one_color(position, probe.0));

@@ -18,6 +18,7 @@ use super::follow::{around, display_difference, follow};
 use super::tiles::PixelRect;
 use super::tracer::Tracer;
 use super::workers::Exposure;
+use crate::ids::MeshId;
 use glam::DVec2;
 
 /// Samples of a settled pixel.
@@ -97,22 +98,21 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// Whether a traced pixel and those around it, all of the tile, are alike.
     fn is_even(&self, pixel: [u32; 2]) -> bool {
-        // What reaches a pixel and was not seen in it is thin: samples that miss cost little.
-        let Some(own) = self.tile.probe(pixel).filter(|own| own.probe.smooth.is_some()) else { return false };
+        let Some(own) = self.tile.probe(pixel) else { return false };
         let is_alike = |beside| match self.tile.probe(beside) {
             Some(other) => self.is_alike(own, other),
             None => matches!(self.tile.find(beside).1, Cell::Holds { .. }),
         };
         let area = self.tile.area();
+        // What reaches a pixel and was not seen in it is thin: samples that miss cost little, so that background is never even.
         around(area, pixel, 1).count() == 9
             && around(area, pixel, 1).all(is_alike)
-            && self.shows_no_edge_of_pattern(pixel, own)
+            && own.probe.smooth.is_some_and(|own| self.shows_no_edge_of_pattern(pixel, own.mesh))
     }
 
-    /// Whether the centres of a traced pixel and of those around it, between which its samples lie, are all on one square of a
-    /// pattern, or on a mesh that has none.
-    fn shows_no_edge_of_pattern(&self, pixel: [u32; 2], own: &TracedProbe) -> bool {
-        let Some(mesh) = own.probe.smooth.map(|smooth| smooth.mesh) else { return true };
+    /// Whether the mesh that a pixel and those around it show has no pattern, or all their centres, between which the pixel's
+    /// samples lie, are on one square of it.
+    fn shows_no_edge_of_pattern(&self, pixel: [u32; 2], mesh: MeshId) -> bool {
         let position = |pixel: [u32; 2]| {
             let smooth = self.tile.probe(pixel)?.probe.smooth?;
             let center = DVec2::from(pixel.map(f64::from)) + 0.5;
