@@ -49,7 +49,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Probes whose normals are further from the others' mean than this, as a cosine, have a crease between them.
-const CREASE_COSINE: f32 = 0.8;
+pub(super) const CREASE_COSINE: f32 = 0.8;
 
 /// Steps from one pixel to the next, in display units, that are followed whatever the tolerance: an edge may begin faintly. With
 /// 0.04, trex at 10/255 lost a shadow; 0.01 takes 8 % more rays there, and 3 % at 5/255.
@@ -96,8 +96,7 @@ pub fn render_adaptive<T: Tracer>(
             let shader = Shader::new(&mut tracer, appearance, settings);
             let footprints = Footprints::new(&scenery);
             let tile = Tile::new(settings.size);
-            let (contradicting, outcome) = (Vec::new(), Outcome::default());
-            let mut worker = Worker { job: &job, footprints, shader, tile, contradicting, outcome };
+            let mut worker = Worker { job: &job, footprints, shader, tile, outcome: Outcome::default() };
             work(&mut worker);
             Outcome { rays: worker.shader.rays(), ..worker.outcome }
         });
@@ -162,8 +161,6 @@ pub(super) struct Worker<'j, 's, T> {
     footprints: Footprints<'j>,
     pub(super) shader: Shader<'s, T>,
     pub(super) tile: Tile,
-    /// Pixels of the tile whose samples contradict the first of them.
-    pub(super) contradicting: Vec<[u32; 2]>,
     outcome: Outcome,
 }
 
@@ -217,7 +214,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         self.outcome.seconds.interpolate += interpolated.as_secs_f64();
     }
 
-    pub(super) fn is_grouped(&self) -> bool {
+    fn is_grouped(&self) -> bool {
         self.job.is_possible() && !self.footprints.is_crowded()
     }
 
@@ -324,7 +321,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
             self.shader.probe(interpolation.camera, ray, sampler)
         };
         let shown = Shown::new(probe.sample.radiance);
-        self.tile.set_probe(pixel, TracedProbe { probe, shown, misses: self.shader.misses() - before });
+        let misses = self.shader.misses() - before;
+        self.tile.set_probe(pixel, TracedProbe { probe, shown, seen: [shown; 2], misses });
     }
 
     /// The pixel, unless it is to be interpolated: then a mere note of that.
@@ -437,7 +435,7 @@ pub(super) struct Interpolation<'a> {
 }
 
 impl<'a> Interpolation<'a> {
-    fn is_possible(&self) -> bool {
+    pub(super) fn is_possible(&self) -> bool {
         self.settings.integrator == IntegratorKind::Whitted && self.appearance.lights.len() <= LightMasks::CAPACITY
     }
 

@@ -42,6 +42,8 @@ pub(super) struct TracedProbe {
     pub probe: Probe,
     /// The colour that it shows: it is compared with many.
     pub shown: Shown,
+    /// The least and the most that samples of its pixel have shown so far, channel by channel.
+    pub seen: [Shown; 2],
     /// Blocks built for it.
     pub misses: Built,
 }
@@ -119,6 +121,12 @@ impl Tile {
         debug_assert_eq!(self.places[idx], UNTRACED);
         self.places[idx] = self.traced.len() as u16;
         self.traced.push(probe);
+    }
+
+    /// Notes what all samples of a traced pixel have shown.
+    pub fn note_seen(&mut self, pixel: [u32; 2], seen: [Shown; 2]) {
+        let place = self.places[self.probe_idx(pixel)];
+        self.traced[usize::from(place)].seen = seen;
     }
 
     fn probe_idx(&self, [x, y]: [u32; 2]) -> usize {

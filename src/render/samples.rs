@@ -11,27 +11,30 @@
 //! 1. A settled pixel has two samples, any other traced one has all, bit for bit those that it has without groups.
 //! 2. Pixels at the sides of a tile are never settled: their neighbours beyond are not known.
 
-use super::adaptive::Worker;
+use super::adaptive::{CREASE_COSINE, Worker};
 use super::cells::{Cell, TracedProbe};
 use super::film::PixelRecord;
-use super::follow::{around, display_difference, follow};
+use super::follow::{Shown, around, display_difference, follow};
 use super::tiles::PixelRect;
 use super::tracer::Tracer;
 use super::workers::Exposure;
 use crate::ids::MeshId;
-use glam::DVec2;
+use glam::{DVec2, DVec3, Vec3};
 
 /// Samples of a settled pixel.
 const SETTLED: u32 = 2;
 
-/// How far from a pixel that contradicts others take all samples. If only what differs by the tolerance contradicted, instead of
-/// by half an edge, city would lose a line with 1, and with 2 take 8 % more rays (1920x1080, four samples, 5/255).
+/// How far from a pixel settled ones take all samples if one of its own is not like theirs.
 const REACH: i32 = 1;
+
+/// How far the way between two points of one surface may lead out of their tangent planes, as a sine. Where normals turn as far as
+/// they may, a circle has 0.32.
+const MAX_SINE: f64 = 0.3;
 
 impl<T: Tracer> Worker<'_, '_, T> {
     /// Whether pixels have several samples, some of which may be saved.
     pub(super) fn is_sampled_by_need(&self) -> bool {
-        self.job.settings.spp > 1 && self.is_grouped()
+        self.job.settings.spp > 1 && self.job.is_possible()
     }
 
     /// Traces the first sample of every pixel that is not interpolated.
@@ -48,29 +51,26 @@ impl<T: Tracer> Worker<'_, '_, T> {
         let mut exposure = self.first_sample(pixel);
         if !self.is_sampled_by_need() {
             self.job.pixels().expose(&mut self.shader, pixel, &mut exposure, self.job.settings.spp);
-        } else if !(self.is_even(pixel) && self.is_confirmed(pixel, &mut exposure))
-            && self.complete(pixel, &mut exposure)
-        {
-            self.contradicting.push(pixel);
+        } else if !(self.is_even(pixel) && self.is_confirmed(pixel, &mut exposure)) {
+            self.complete(pixel, &mut exposure);
         }
         exposure
     }
 
-    /// Traces all samples of the settled pixels beside those that contradict, and so on.
+    /// Traces all samples of the settled pixels that samples around them contradict, and so on.
     pub(super) fn follow_samples(&mut self, tile: PixelRect, records: &mut [PixelRecord]) {
-        let contradicting = std::mem::take(&mut self.contradicting);
-        let beside = contradicting.iter().flat_map(|&pixel| around(tile, pixel, REACH)).collect();
-        follow(tile, REACH, beside, |pixel| {
+        let is_settled = |record: &PixelRecord| record.samples == SETTLED && SETTLED < self.job.settings.spp;
+        let settled = tile.pixels().zip(&*records).filter(|(_, record)| is_settled(record)).map(|(pixel, _)| pixel);
+        follow(tile, REACH, settled.collect(), |pixel| {
             let record = &mut records[tile.idx(pixel).expect("samples are followed within the tile")];
-            record.samples == SETTLED && record.samples < self.job.settings.spp && {
+            let is_wrong = is_settled(record) && self.is_contradicted(tile, pixel);
+            if is_wrong {
                 let mut exposure = self.first_sample(pixel);
-                let contradicts = self.complete(pixel, &mut exposure);
+                self.complete(pixel, &mut exposure);
                 *record = PixelRecord { reason: record.reason, ..exposure.record() };
-                contradicts
             }
+            is_wrong
         });
-        self.contradicting = contradicting;
-        self.contradicting.clear();
     }
 
     /// The first sample of a pixel of the tile, if it was traced.
@@ -78,15 +78,18 @@ impl<T: Tracer> Worker<'_, '_, T> {
         self.tile.probe(pixel).map_or(Exposure::default(), |p| Exposure::new(&p.probe.sample, p.misses))
     }
 
-    /// Traces the rest of a pixel's samples; whether all of them contradict the first, or the first two. (Of an edge that two of
-    /// four samples lie beyond, the first two may be one on each side.)
-    fn complete(&mut self, pixel: [u32; 2], exposure: &mut Exposure) -> bool {
-        let (pixels, spp) = (self.job.pixels(), self.job.settings.spp);
-        let first = self.first_sample(pixel).mean();
-        pixels.expose(&mut self.shader, pixel, exposure, SETTLED);
-        let two = exposure.mean();
-        pixels.expose(&mut self.shader, pixel, exposure, spp);
-        [first, two].iter().any(|&mean| display_difference(mean, exposure.mean()) > 0.5 * self.job.edge())
+    /// Traces the rest of a pixel's samples.
+    fn complete(&mut self, pixel: [u32; 2], exposure: &mut Exposure) {
+        self.job.pixels().expose(&mut self.shader, pixel, exposure, self.job.settings.spp);
+        self.tile.note_seen(pixel, exposure.range().map(Shown::new));
+    }
+
+    /// Whether some sample of the pixels around a traced one, as far as they are traced, is not like its first.
+    fn is_contradicted(&self, tile: PixelRect, pixel: [u32; 2]) -> bool {
+        let Some(own) = self.tile.probe(pixel) else { return false };
+        let most = if self.shows_points(own) { 1.0 } else { 2.0 } * self.job.settings.tolerance;
+        let mut beside = around(tile, pixel, REACH).filter_map(|beside| self.tile.probe(beside));
+        beside.any(|beside| beside.seen.iter().any(|seen| own.shown.difference(*seen) > most))
     }
 
     /// Traces a second sample of a pixel; whether it agrees with the first: what is smaller than a pixel, neighbours do not show.
@@ -100,7 +103,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
     fn is_even(&self, pixel: [u32; 2]) -> bool {
         let Some(own) = self.tile.probe(pixel) else { return false };
         let is_alike = |beside| match self.tile.probe(beside) {
-            Some(other) => self.is_alike(own, other),
+            Some(other) => self.is_alike((pixel, own), (beside, other)),
             None => matches!(self.tile.find(beside).1, Cell::Holds { .. }),
         };
         let area = self.tile.area();
@@ -115,8 +118,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
     fn shows_no_edge_of_pattern(&self, pixel: [u32; 2], mesh: MeshId) -> bool {
         let position = |pixel: [u32; 2]| {
             let smooth = self.tile.probe(pixel)?.probe.smooth?;
-            let center = DVec2::from(pixel.map(f64::from)) + 0.5;
-            Some(self.job.position(center, smooth.inverse_depth).0)
+            Some(self.position_at(pixel, smooth.inverse_depth))
         };
         let has_one_color = |beside| {
             let ends = position(pixel).zip(position(beside));
@@ -125,10 +127,41 @@ impl<T: Tracer> Worker<'_, '_, T> {
         !self.job.appearance.is_patterned(mesh) || around(self.tile.area(), pixel, 1).all(has_one_color)
     }
 
-    /// Whether samples between two pixels are like those at their centres, as far as one can tell: a pixel reaches half way to
-    /// the next, so that twice the tolerance may lie between them. Light that took another way, though in the same colour,
-    /// tells of an edge nearby.
-    fn is_alike(&self, a: &TracedProbe, b: &TracedProbe) -> bool {
-        a.probe.trail() == b.probe.trail() && a.shown.difference(b.shown) <= 2.0 * self.job.settings.tolerance
+    /// Whether samples between two pixels are like those at their centres, as far as one can tell. A pixel reaches half way to
+    /// the next, so that twice the tolerance may lie between them where colour changes smoothly. Light that took another way
+    /// tells of an edge nearby, beyond which all of a pixel's samples may lie.
+    fn is_alike(&self, (pixel, own): Place<'_>, (beside, other): Place<'_>) -> bool {
+        let (difference, tolerance) = (own.shown.difference(other.shown), self.job.settings.tolerance);
+        if own.probe.trail() == other.probe.trail() {
+            difference <= 2.0 * tolerance
+        } else {
+            difference <= tolerance && !self.shows_points(own) && self.is_one_surface((pixel, own), (beside, other))
+        }
+    }
+
+    /// Whether a mirror or glass is seen.
+    fn shows_points(&self, seen: &TracedProbe) -> bool {
+        seen.probe.smooth.is_some_and(|smooth| !self.job.appearance.reflects_little(smooth.mesh))
+    }
+
+    /// Whether a smooth surface leads from what is seen at one pixel to what is seen at the other: neither a border, with which
+    /// thin things begin, nor a crease is between them.
+    fn is_one_surface(&self, (pixel, own): Place<'_>, (beside, other): Place<'_>) -> bool {
+        let (Some(from), Some(to)) = (own.probe.smooth, other.probe.smooth) else { return false };
+        let way = self.position_at(beside, to.inverse_depth) - self.position_at(pixel, from.inverse_depth);
+        let lies_along = |normal: Vec3| way.dot(normal.as_dvec3()).abs() <= MAX_SINE * way.length();
+        from.mesh == to.mesh
+            && from.normal.dot(to.normal) >= CREASE_COSINE
+            && lies_along(from.normal)
+            && lies_along(to.normal)
+    }
+
+    /// What is seen at a pixel's centre, in world space.
+    fn position_at(&self, pixel: [u32; 2], inverse_depth: f32) -> DVec3 {
+        let center = DVec2::from(pixel.map(f64::from)) + 0.5;
+        self.job.position(center, inverse_depth).0
     }
 }
+
+/// A pixel and what is seen there.
+type Place<'p> = ([u32; 2], &'p TracedProbe);

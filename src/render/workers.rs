@@ -125,6 +125,8 @@ pub(super) struct Exposure {
     n: u32,
     first: Option<FirstHit>,
     misses: Built,
+    /// The least and the most radiance of a sample, channel by channel.
+    range: Option<[Vec3; 2]>,
 }
 
 impl Exposure {
@@ -139,6 +141,13 @@ impl Exposure {
         self.sum += sample.radiance.as_dvec3();
         self.n += 1;
         self.first.get_or_insert(sample.first);
+        let [least, most] = self.range.unwrap_or([sample.radiance; 2]);
+        self.range = Some([least.min(sample.radiance), most.max(sample.radiance)]);
+    }
+
+    /// The least and the most radiance of at least one sample, channel by channel.
+    pub fn range(&self) -> [Vec3; 2] {
+        self.range.expect("a pixel has at least one sample")
     }
 
     /// Mean radiance of at least one sample.

@@ -15,6 +15,10 @@ use crate::scene::camera::Camera;
 use crate::scene::description::Albedo;
 use glam::{DVec3, Vec3};
 
+/// Mirrors that reflect more show glints: of 150 pictures of mirrors and half mirrors three lost one more when pixels of theirs were
+/// settled as readily as others (`samples`); of 0.2, none of 100 did.
+const MOST_LITTLE_MIRROR: f32 = 0.25;
+
 /// A sample and what can be interpolated of it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::render) struct Probe {
@@ -160,6 +164,12 @@ impl Appearance {
     /// Whether direct light can be computed again from a normal and the lights that are seen.
     pub(in crate::render) fn can_reshade(&self) -> bool {
         !self.any_glass && self.lights.len() <= LightMasks::CAPACITY
+    }
+
+    /// Whether what a mesh reflects adds little to what it shows: in mirrors and glass, things and lights may be as small as points.
+    pub(in crate::render) fn reflects_little(&self, mesh: MeshId) -> bool {
+        let material = &self.materials[mesh.idx()];
+        material.glass.is_none() && material.mirror.max_element() <= MOST_LITTLE_MIRROR
     }
 
     /// Whether a mesh's colour changes faster than pixels may notice.
