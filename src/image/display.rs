@@ -51,7 +51,7 @@ pub fn display_pixels(linear: &[[f32; 3]]) -> impl Iterator<Item = [f32; 3]> {
     })
 }
 
-/// The sRGB transfer function, from linear to encoded, for 0..=1.
+/// The sRGB transfer function (IEC 61966-2-1), from linear to encoded, for 0..=1.
 pub fn srgb_from_linear(linear: f32) -> f32 {
     // The power in f32, a third of the work in f64, is good to 1e-7. But in f32, 1.055 - 0.055 is less than 1: white would not
     // be white.

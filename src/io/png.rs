@@ -3,6 +3,7 @@
 use super::picture::{RgbPicture, check_size};
 use super::write::write_whole;
 use crate::error::Result;
+use crate::image::display::linear_from_srgb;
 use ::png::{
     BitDepth, ColorType, Compression, Decoder, Encoder, EncodingError, Limits, ScaledFloat, SrgbRenderingIntent,
     Transformations,
@@ -72,11 +73,6 @@ fn decode_pixel(bytes: &[u8], n_samples: usize, sample_bytes: usize) -> [f32; 3]
             _ => f32::from(sample[0]) / 255.0,
         })
     })
-}
-
-/// The sRGB transfer function (IEC 61966-2-1) from display to linear.
-pub(super) fn linear_from_srgb(value: f32) -> f32 {
-    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
 #[cfg(test)]

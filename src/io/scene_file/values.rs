@@ -1,5 +1,6 @@
 //! Values that check themselves while serde reads them, so that an error carries the line of the value.
 
+use crate::image::display::linear_from_srgb;
 use glam::{DQuat, DVec3, EulerRot, Vec3};
 use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
 use std::fmt;
@@ -103,7 +104,7 @@ impl<'de> Visitor<'de> for ColourVisitor {
         let packed = digits.and_then(|d| u32::from_str_radix(d, 16).ok());
         let [_, r, g, b] =
             packed.ok_or_else(|| E::custom(format!("'{text}' is no colour: write \"#rrggbb\"")))?.to_be_bytes();
-        Ok(Vec3::new(f32::from(r), f32::from(g), f32::from(b)).map(|v| crate::io::png::linear_from_srgb(v / 255.0)))
+        Ok(Vec3::new(f32::from(r), f32::from(g), f32::from(b)).map(|v| linear_from_srgb(v / 255.0)))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Vec3, A::Error> {
