@@ -25,6 +25,7 @@
 pub mod adaptive;
 #[cfg(test)]
 mod analytic;
+mod between_probes;
 pub mod budget;
 mod canvas;
 mod cells;
