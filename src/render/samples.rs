@@ -1,11 +1,14 @@
 //! Several samples a pixel, and few where they would be alike.
 //!
 //! Of every pixel that is not interpolated the first sample is traced, before any other. Where it is **even** with those
-//! around it, in colour and in the way that its light took, a second one decides: if that agrees, the pixel is **settled**
-//! with two. All others take every sample. What is thinner than a pixel may lie between the first two samples of some pixels
-//! along it, but not of all: where all samples of a pixel contradict its first, or its first two, the settled pixels beside it
-//! take every sample as well, and so on along the line, as edges are followed into groups. Patterns are looked up: nothing is
-//! settled where one of their edges passes.
+//! around it a second one decides: if that agrees, the pixel is **settled** with two. All others take every sample. Pixels are
+//! even if they show nearly the same colour, and their light has taken the same way; if it has taken another there is an edge
+//! somewhere between, which does not matter if both its sides have the same colour and the surface goes on across it.
+//!
+//! What is thinner than a pixel may lie between the first two samples of some pixels along it, but not of all. So a pixel stays
+//! settled only while all samples of the pixels around it are like its own: where one is not, it takes every sample as well, and
+//! so on along the line, as edges are followed into groups. Patterns are looked up: nothing is settled where one of their edges
+//! passes. What mirrors and glass show may be a point, and has to be more alike.
 //!
 //! # Invariants
 //! 1. A settled pixel has two samples, any other traced one has all, bit for bit those that it has without groups.

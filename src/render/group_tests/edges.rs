@@ -47,6 +47,7 @@ fn nothing_is_lost_of_dull_mirroring_and_checkered_shapes() {
     let dull = Material { specular: Vec3::ZERO, ..Material::default() };
     let mirror = Material { mirror: Vec3::splat(0.4), ..Material::default() };
     let checker = |size| Material { diffuse: Albedo::Checker { even, odd, size }, ..Material::default() };
+    let mut failures = Vec::new();
     for (k, (name, mesh)) in shapes::all().into_iter().enumerate() {
         for turn in 0..n_views() {
             let from = direction(k, turn);
@@ -54,12 +55,15 @@ fn nothing_is_lost_of_dull_mirroring_and_checkered_shapes() {
                 let stage = stage(mesh.clone(), material.clone(), from);
                 for spp in [1, 2, 4, 8] {
                     let (missed, share) = lost(&stage, spp);
-                    let what = format!("{name} from {from}, {spp} samples, {material:?}");
-                    assert!(missed == 0 && share <= 0.01, "{missed} lost, {share} wrong: {what}");
+                    if missed > 0 || share > 0.01 {
+                        let what = format!("{name} from {from}, {spp} samples, {:?}", material.diffuse);
+                        failures.push(format!("{missed} lost, {share} wrong: {what}, mirror {}", material.mirror));
+                    }
                 }
             }
         }
     }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 #[test]
