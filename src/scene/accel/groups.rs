@@ -5,10 +5,11 @@
 //! all groups but the last are full then, and what is above them has an eighth of the boxes.
 
 use super::LANES;
+use super::build::Care;
 use crate::math::Bounds;
 use glam::Vec3;
 
-/// Boxes of which all three orders are compared; of more, slabs along the longest axis are.
+/// Boxes of which all three orders are compared; of more, slabs along one axis or all are.
 const MOST_SORTED: usize = 32;
 
 /// Slabs of centres that are compared.
@@ -47,24 +48,24 @@ impl Group {
 }
 
 /// The groups of some of `boxes`.
-pub(super) fn groups(boxes: &[Bounds], members: &[u32]) -> Vec<Group> {
+pub(super) fn groups(boxes: &[Bounds], members: &[u32], care: Care) -> Vec<Group> {
     let mut items: Vec<Item> = members.iter().map(|&number| Item { bounds: boxes[number as usize], number }).collect();
     let mut groups = Vec::with_capacity(items.len().div_ceil(LANES));
-    divide(&mut items, &mut groups);
+    divide(&mut items, care, &mut groups);
     groups
 }
 
-fn divide(items: &mut [Item], groups: &mut Vec<Group>) {
+fn divide(items: &mut [Item], care: Care, groups: &mut Vec<Group>) {
     if items.len() <= LANES {
         let mut numbers = [0; LANES];
         numbers.iter_mut().zip(&*items).for_each(|(number, item)| *number = item.number);
         groups.push(Group { bounds: union(items), numbers, len: items.len() });
         return;
     }
-    let middle = if items.len() <= MOST_SORTED { split_sorted(items) } else { split_slabs(items) };
+    let middle = if items.len() <= MOST_SORTED { split_sorted(items) } else { split_slabs(items, care) };
     let (low, high) = items.split_at_mut(middle);
-    divide(low, groups);
-    divide(high, groups);
+    divide(low, care, groups);
+    divide(high, care, groups);
 }
 
 fn union(items: &[Item]) -> Bounds {
@@ -140,25 +141,31 @@ fn cheapest(items: &[Item], order: &Order) -> (f32, usize) {
 }
 
 /// Puts the items below the cheapest slab boundary first, or rather a multiple of eight.
-fn split_slabs(items: &mut [Item]) -> usize {
+fn split_slabs(items: &mut [Item], care: Care) -> usize {
     let n = items.len();
     let (low, high) = items.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), item| {
         (low.min(item.center()), high.max(item.center()))
     });
     let extent = high - low;
-    let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).expect("three axes");
-    let scale = N_BINS as f32 / extent[axis].max(f32::MIN_POSITIVE);
-    let bin = |item: &Item| (((item.center()[axis] - low[axis]) * scale) as usize).min(N_BINS - 1);
+    let longest = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).expect("three axes");
+    let axes = if care == Care::Thorough { 0..3 } else { longest..longest + 1 };
+    let boundary = |axis: usize| {
+        let scale = N_BINS as f32 / extent[axis].max(f32::MIN_POSITIVE);
+        let bin = |item: &Item| (((item.center()[axis] - low[axis]) * scale) as usize).min(N_BINS - 1);
+        best_boundary(items, bin).map(|(cost, near)| (cost, axis, near))
+    };
+    let best = axes.filter_map(boundary).min_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, axis, near) = best.unwrap_or((0.0, longest, n / 2));
     let least = n / LEAST_SHARE;
-    let near = best_boundary(items, bin).unwrap_or(n / 2).clamp(least, n - least);
+    let near = near.clamp(least, n - least);
     let middle = (near + LANES / 2) / LANES * LANES;
     let order = |a: &Item, b: &Item| a.center()[axis].total_cmp(&b.center()[axis]).then(a.number.cmp(&b.number));
     items.select_nth_unstable_by(middle, order);
     middle
 }
 
-/// How many items are below the cheapest boundary between slabs, if there is any.
-fn best_boundary(items: &[Item], bin: impl Fn(&Item) -> usize) -> Option<usize> {
+/// The cost of the cheapest boundary between slabs, and how many items are below it, if there is any.
+fn best_boundary(items: &[Item], bin: impl Fn(&Item) -> usize) -> Option<(f32, usize)> {
     let mut slabs = [(Bounds::EMPTY, 0usize); N_BINS];
     for item in items {
         let slab = &mut slabs[bin(item)];
@@ -171,15 +178,16 @@ fn best_boundary(items: &[Item], bin: impl Fn(&Item) -> usize) -> Option<usize> 
         above[i] = half_area(&bounds) * count as f32;
     }
     (bounds, count) = (Bounds::EMPTY, 0);
-    let mut best = (f32::INFINITY, None);
+    let mut best = None;
+    let mut least = f32::INFINITY;
     for boundary in 1..N_BINS {
         (bounds, count) = (bounds.union(slabs[boundary - 1].0), count + slabs[boundary - 1].1);
         let cost = half_area(&bounds) * count as f32 + above[boundary];
-        if count > 0 && count < items.len() && cost < best.0 {
-            best = (cost, Some(count));
+        if count > 0 && count < items.len() && cost < least {
+            (least, best) = (cost, Some((cost, count)));
         }
     }
-    best.1
+    best
 }
 
 #[cfg(test)]
@@ -191,9 +199,10 @@ mod tests {
         let at = |i: u64| Vec3::new((i * 7919 % 1000) as f32, (i * 104_729 % 777) as f32, (i % 13) as f32);
         let scattered: Vec<Bounds> = (0..4001).map(|i| Bounds { min: at(i), max: at(i) + 1.0 }).collect();
         let equal = vec![Bounds { min: Vec3::ONE, max: Vec3::ONE }; 1001];
-        for boxes in [&scattered[..], &scattered[..63], &scattered[..9], &scattered[..1], &equal] {
+        let some = [&scattered[..], &scattered[..63], &scattered[..9], &scattered[..1], &equal];
+        for (boxes, care) in some.into_iter().flat_map(|boxes| [(boxes, Care::Thorough), (boxes, Care::Hasty)]) {
             let members: Vec<u32> = (0..boxes.len() as u32).collect();
-            let groups = groups(boxes, &members);
+            let groups = groups(boxes, &members, care);
             assert_eq!(groups.len(), boxes.len().div_ceil(LANES));
             let mut all: Vec<u32> = groups.iter().flat_map(|g| g.numbers()).copied().collect();
             all.sort_unstable();

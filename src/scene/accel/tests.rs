@@ -70,6 +70,10 @@ fn entry(b: &Bounds, origin: DVec3, direction: DVec3) -> Option<f64> {
     (enter <= leave).then_some(enter)
 }
 
+/// Numbers of patches whose trees are built either way.
+const THOROUGH: usize = 16_000;
+const HASTY: usize = 20_000;
+
 #[test]
 fn a_tree_over_nothing_visits_nothing() {
     let tree = TopLevel::build(&[], 1);
@@ -187,26 +191,31 @@ fn boxes_without_number_in_one_place_are_a_tree_too() {
         Bounds { min: Vec3::splat(3.0), max: Vec3::splat(3.0) },
         Bounds { min: Vec3::splat(-8e6), max: Vec3::splat(8e6) },
     ] {
-        let tree = TopLevel::build(&vec![b; 20_000], 2);
-        let visits = run(Visits(&tree, &ray(DVec3::new(3.0, 3.0, -9e6), DVec3::Z)));
-        assert_eq!(visits.len(), 20_000);
-        assert!(tree.stack_need < 300, "{}", tree.stack_need);
+        for n in [THOROUGH, HASTY] {
+            let tree = TopLevel::build(&vec![b; n], 2);
+            let visits = run(Visits(&tree, &ray(DVec3::new(3.0, 3.0, -9e6), DVec3::Z)));
+            assert_eq!(visits.len(), n);
+            assert!(tree.stack_need < 300, "{}", tree.stack_need);
+        }
     }
 }
 
 #[test]
 fn a_ribbon_of_equal_boxes_makes_a_shallow_tree() {
-    let boxes =
-        (0..100_000).map(|i| Vec3::X * (64 * i) as f32).map(|p| Bounds { min: p, max: p + Vec3::new(64.0, 64.0, 0.0) });
-    assert!(TopLevel::build(&boxes.collect::<Vec<_>>(), 2).stack_need < 200);
+    for n in [THOROUGH, 100_000] {
+        let corners = (0..n).map(|i| Vec3::X * (64 * i) as f32);
+        let boxes = corners.map(|p| Bounds { min: p, max: p + Vec3::new(64.0, 64.0, 0.0) });
+        assert!(TopLevel::build(&boxes.collect::<Vec<_>>(), 2).stack_need < 200);
+    }
 }
 
 #[test]
 fn boxes_of_growing_size_make_a_tree_of_bounded_depth() {
-    let boxes = (0..20_000)
-        .map(|i| f32::powf(2.0, 24.0 * i as f32 / 20_000.0))
-        .map(|r| Bounds { min: Vec3::splat(r), max: Vec3::splat(1.01 * r) });
-    assert!(TopLevel::build(&boxes.collect::<Vec<_>>(), 2).stack_need < 400);
+    for n in [THOROUGH, HASTY] {
+        let sizes = (0..n).map(|i| f32::powf(2.0, 24.0 * i as f32 / n as f32));
+        let boxes = sizes.map(|r| Bounds { min: Vec3::splat(r), max: Vec3::splat(1.01 * r) });
+        assert!(TopLevel::build(&boxes.collect::<Vec<_>>(), 2).stack_need < 400);
+    }
 }
 
 #[test]
