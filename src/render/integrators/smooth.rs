@@ -15,8 +15,8 @@ use crate::scene::camera::Camera;
 use crate::scene::description::Albedo;
 use glam::{DVec3, Vec3};
 
-/// Mirrors that reflect more show glints: of 150 pictures of mirrors and half mirrors three lost one more when pixels of theirs were
-/// settled as readily as others (`samples`); of 0.2, none of 100 did.
+/// Mirrors that reflect more show glints: when their pixels were settled as readily as others (`samples`), four of 100 pictures of
+/// mirrors of 0.5 and 0.9 lost one more; of mirrors of 0.2, none of 100 lost any.
 const MOST_LITTLE_MIRROR: f32 = 0.25;
 
 /// A sample and what can be interpolated of it.
