@@ -50,6 +50,10 @@ use std::time::Instant;
 /// Probes whose normals are further from the others' mean than this, as a cosine, have a crease between them.
 pub(super) const CREASE_COSINE: f32 = 0.8;
 
+/// The same for what is reflected and refracted, as the length of a difference of normals times the share of their light: faint images
+/// may be turned as they like. With 0.63, two more of 150 pictures of mirrors lose a glint at one sample; with 0.2 as many are lost.
+const MOST_TURNED: f32 = 0.4;
+
 /// How far from a pixel that contradicts others are traced. What is about a pixel thin comes and goes: with 1 instead of 2, 2 %
 /// fewer rays are traced on trex, and gaps of a pixel end a line.
 const REACH: i32 = 2;
@@ -398,9 +402,48 @@ fn first_difference(smooths: &[&Smooth]) -> Option<Reason> {
         return Some(Reason::Shadow);
     }
     let same_way = smooths.iter().all(|s| s.signature == first.signature);
-    if same_way { None } else { Some(Reason::Reflection) }
+    if same_way && mirror_one_surface(smooths) { None } else { Some(Reason::Reflection) }
+}
+
+/// Whether what probes see by reflection and refraction is no more turned than one surface may be.
+fn mirror_one_surface(smooths: &[&Smooth]) -> bool {
+    let mean = smooths.iter().map(|s| s.mirrored).sum::<Vec3>() / smooths.len() as f32;
+    smooths.iter().all(|s| s.mirrored.distance(mean) <= MOST_TURNED)
 }
 
 fn all_lights(smooths: &[&Smooth]) -> LightMasks {
     smooths.iter().fold(LightMasks::default(), |all, s| all | s.lights)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seen by a mirror that reflects `share` of the light: something whose normal is `mirrored`.
+    fn seen(share: f32, mirrored: Vec3) -> Smooth {
+        Smooth {
+            mesh: MeshId(0),
+            outside: true,
+            normal: Vec3::Y,
+            inverse_depth: 1.0,
+            secondary: Vec3::ONE,
+            lights: LightMasks::default(),
+            signature: 0,
+            mirrored: share * mirrored,
+        }
+    }
+
+    #[test]
+    fn an_edge_that_a_mirror_shows_is_one_even_if_one_mesh_is_on_both_its_sides() {
+        let slightly_turned = Vec3::new(0.3, 1.0, 0.0).normalize();
+        for (share, mirrored, expected) in [
+            (0.9, slightly_turned, None),
+            (0.9, Vec3::X, Some(Reason::Reflection)),
+            (0.9, Vec3::ZERO, Some(Reason::Reflection)),
+            (0.2, Vec3::X, None),
+        ] {
+            let (most, one) = (seen(share, Vec3::Y), seen(share, mirrored));
+            assert_eq!(first_difference(&[&most, &most, &one, &most]), expected, "{share} of {mirrored}");
+        }
+    }
 }

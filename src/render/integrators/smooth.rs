@@ -2,8 +2,8 @@
 //!
 //! A [`Probe`] is a sample with its **smooth** parts: normal, inverse depth (linear over the picture on a plane), light
 //! that came by reflection or refraction. Its **trail** tells which way the light took: lights that were blocked, meshes
-//! that secondary rays hit, and where on their patterns. Between probes with the same trail the smooth parts can be
-//! interpolated and shaded again, without a ray.
+//! that secondary rays hit, and where on their patterns. Between probes with the same trail, where what mirrors show is not
+//! turned too far, the smooth parts can be interpolated and shaded again, without a ray.
 
 use super::{Sample, Shader};
 use crate::ids::MeshId;
@@ -49,6 +49,8 @@ pub(in crate::render) struct Smooth {
     pub lights: LightMasks,
     /// Equal for samples whose secondary rays hit the same meshes, on the same cube of a pattern, and had the same lights.
     pub signature: u64,
+    /// Unit normals of what is seen by reflection and refraction, each times the share of its light that reaches the eye.
+    pub mirrored: Vec3,
 }
 
 /// Lights by number.
@@ -92,6 +94,7 @@ pub(super) struct Trail {
     first_lights: LightMasks,
     first_local: Vec3,
     signature: u64,
+    mirrored: Vec3,
 }
 
 impl Trail {
@@ -114,6 +117,11 @@ impl Trail {
         if cube != DVec3::ZERO {
             cube.to_array().into_iter().for_each(|x| self.mix(x.to_bits()));
         }
+    }
+
+    /// What a secondary ray of this weight hit.
+    pub fn note_mirrored(&mut self, weight: Vec3, normal: DVec3) {
+        self.mirrored += weight.max_element() * normal.as_vec3();
     }
 
     pub fn note_light(&mut self, number: usize, state: LightState) {
@@ -143,6 +151,7 @@ impl<T: Tracer> Shader<'_, T> {
             secondary: sample.radiance - self.trail.first_local,
             lights: self.trail.first_lights,
             signature: self.trail.signature,
+            mirrored: self.trail.mirrored,
         });
         Probe { sample, smooth }
     }

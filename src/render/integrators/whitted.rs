@@ -35,6 +35,7 @@ impl<'a, T: Tracer> Shader<'a, T> {
                 radiance += weight * self.appearance.background;
                 continue;
             };
+            self.trail.note_mirrored(weight, x.normal);
             radiance += weight * self.local_light(&x);
             self.push_secondary(&x, weight, depth + 1);
         }
