@@ -123,12 +123,18 @@ pub struct Appearance {
     pub(super) background: Vec3,
     pub(super) sky: Vec3,
     pub(super) any_glass: bool,
+    /// Radiance of the brightest thing that there may be.
+    pub(super) brightest: f32,
 }
 
 impl Appearance {
     /// `materials[i]` belongs to `MeshId(i)`; `background` is seen by rays that leave the scene and lights nothing.
     pub fn new(materials: Vec<Material>, lights: Vec<Light>, background: Vec3) -> Self {
         let any_glass = materials.iter().any(|material| material.glass.is_some());
-        Self { sky: sky_radiance(&lights), any_glass, materials, lights, background }
+        let sky = sky_radiance(&lights);
+        let irradiance: f32 = lights.iter().map(Light::most_irradiance).sum();
+        let surfaces = materials.iter().map(|material| material.most_reflected() * irradiance);
+        let brightest = surfaces.fold(0.0, f32::max) + sky.max_element().max(background.max_element());
+        Self { sky, any_glass, brightest, materials, lights, background }
     }
 }

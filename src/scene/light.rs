@@ -15,6 +15,15 @@ pub struct Incident {
 }
 
 impl Light {
+    /// The most irradiance of a surface, in a channel; a point light may be as near as one likes.
+    pub fn most_irradiance(&self) -> f32 {
+        match self {
+            Self::Point { .. } => f32::INFINITY,
+            Self::Directional { irradiance, .. } => irradiance.max_element(),
+            Self::Sky { .. } => 0.0,
+        }
+    }
+
     /// Light that arrives at `position`. `None` for a sky, which comes from everywhere, and at the place of a point light.
     pub fn incident(&self, position: DVec3) -> Option<Incident> {
         match *self {

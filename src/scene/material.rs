@@ -38,6 +38,15 @@ impl Material {
         (diffuse + self.highlight(normal, to_light, to_eye)) * cosine
     }
 
+    /// The most that [`reflect_light`](Self::reflect_light) can be in a channel, whatever the directions.
+    pub fn most_reflected(&self) -> f32 {
+        let albedo = match self.diffuse {
+            Albedo::Constant(albedo) => albedo,
+            Albedo::Checker { even, odd, .. } => even.max(odd),
+        };
+        (albedo / PI + self.specular * self.highlight_factor()).max_element()
+    }
+
     /// Blinn-Phong with the factor (n + 8) / 8π that keeps the reflected energy about the same for every exponent n.
     fn highlight(&self, normal: Vec3, to_light: Vec3, to_eye: Vec3) -> Vec3 {
         if self.specular == Vec3::ZERO {
@@ -45,7 +54,11 @@ impl Material {
         }
         let half = (to_light + to_eye).normalize_or_zero();
         let lobe = normal.dot(half).max(0.0).powf(self.shininess);
-        self.specular * (lobe * (self.shininess + 8.0) / (8.0 * PI))
+        self.specular * (lobe * self.highlight_factor())
+    }
+
+    fn highlight_factor(&self) -> f32 {
+        (self.shininess + 8.0) / (8.0 * PI)
     }
 }
 
