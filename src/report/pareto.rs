@@ -34,7 +34,7 @@ impl Tradeoff {
             .configure_mesh()
             .x_desc("rays")
             .y_desc("99th percentile of differences, display units")
-            .x_label_formatter(&|rays| format!("{rays:.0}"))
+            .x_label_formatter(&|rays| axis_label(*rays))
             .draw()?;
         let front = self.pareto_front().into_iter().map(|run| (rays(run), run.p99()));
         chart.draw_series(LineSeries::new(front, RGBColor(150, 150, 150)))?;
@@ -50,4 +50,13 @@ impl Tradeoff {
         root.present()?;
         Ok(())
     }
+}
+
+/// The numbers that have room along a logarithmic axis: one, two, three, five and seven times a power of ten.
+fn axis_label(value: f64) -> String {
+    let written = format!("{value:.0}");
+    let has_room = ['1', '2', '3', '5', '7']
+        .iter()
+        .any(|&digit| written.starts_with(digit) && written[1..].bytes().all(|b| b == b'0'));
+    if has_room { written } else { String::new() }
 }
