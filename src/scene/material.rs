@@ -153,4 +153,11 @@ mod tests {
         let radiance = PI * white.reflect_light(Vec3::ONE, Vec3::Y, Vec3::Y, Vec3::Y);
         assert!((radiance - Vec3::ONE).abs().max_element() < 1e-6);
     }
+
+    #[test]
+    fn nothing_is_reflected_more_brightly_than_the_most() {
+        let material = Material { shininess: 90.0, specular: Vec3::splat(0.25), ..Material::default() };
+        let reflected = material.reflect_light(Vec3::splat(0.7), Vec3::Y, Vec3::Y, Vec3::Y).max_element();
+        assert!((reflected / material.most_reflected() - 1.0).abs() < 1e-6);
+    }
 }

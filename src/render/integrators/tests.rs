@@ -197,3 +197,21 @@ fn debug_pictures_show_what_they_are_named_for() {
     assert_eq!(see("debug:miss"), crate::image::color_map::viridis(0.0));
     assert!(see("debug:patch").min_element() >= 0.25);
 }
+
+#[test]
+fn a_faint_mirror_reflects_little_unless_something_shines() {
+    let sun = Light::Directional { direction: DVec3::NEG_Y, irradiance: Vec3::splat(2.5) };
+    let lamp = Light::Point { position: DVec3::Y, intensity: Vec3::ONE };
+    let faint = Material { mirror: Vec3::splat(0.07), ..Material::default() };
+    let steel = Material { specular: Vec3::splat(0.7), shininess: 200.0, ..Material::default() };
+    for (materials, light, expected) in [
+        (vec![faint.clone()], &sun, true),
+        (vec![faint.clone(), steel], &sun, false),
+        (vec![faint], &lamp, false),
+        (vec![lambert(0.5)], &lamp, true),
+        (vec![clear(1.5)], &sun, false),
+    ] {
+        let appearance = Appearance::new(materials, vec![light.clone()], Vec3::ZERO);
+        assert_eq!(appearance.reflects_little(crate::ids::MeshId(0)), expected, "{:?}", appearance.materials);
+    }
+}
