@@ -211,7 +211,7 @@ fn a_faint_mirror_reflects_little_unless_something_shines() {
         (vec![lambert(0.5)], &lamp, true),
         (vec![clear(1.5)], &sun, false),
     ] {
-        let appearance = Appearance::new(materials, vec![light.clone()], Vec3::ZERO);
+        let appearance = Appearance::new(materials, vec![*light], Vec3::ZERO);
         assert_eq!(appearance.reflects_little(crate::ids::MeshId(0)), expected, "{:?}", appearance.materials);
     }
 }
