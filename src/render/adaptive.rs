@@ -407,8 +407,8 @@ fn first_difference(smooths: &[&Smooth]) -> Option<Reason> {
 
 /// Whether what probes see by reflection and refraction is no more turned than one surface may be.
 fn mirror_one_surface(smooths: &[&Smooth]) -> bool {
-    let mean = smooths.iter().map(|s| s.mirrored).sum::<Vec3>() / smooths.len() as f32;
-    smooths.iter().all(|s| s.mirrored.distance(mean) <= MOST_TURNED)
+    let mean = smooths.iter().map(|s| s.mirrored_normal).sum::<Vec3>() / smooths.len() as f32;
+    smooths.iter().all(|s| s.mirrored_normal.distance(mean) <= MOST_TURNED)
 }
 
 fn all_lights(smooths: &[&Smooth]) -> LightMasks {
@@ -429,7 +429,7 @@ mod tests {
             secondary: Vec3::ONE,
             lights: LightMasks::default(),
             signature: 0,
-            mirrored: share * mirrored,
+            mirrored_normal: share * mirrored,
         }
     }
 

@@ -8,7 +8,7 @@
 //! What is thinner than a pixel may lie between the first two samples of some pixels along it, but not of all. So a pixel stays
 //! settled only while all samples of the pixels around it are like its own: where one is not, it takes every sample as well, and
 //! so on along the line, as edges are followed into groups. Patterns are looked up: nothing is settled where one of their edges
-//! passes. What mirrors and glass show may be a point, and has to be more alike.
+//! passes. What glass shows, and mirrors of something bright, may be as small as a point, and has to be more alike.
 //!
 //! # Invariants
 //! 1. A settled pixel has two samples, any other traced one has all, bit for bit those that it has without groups.
@@ -142,7 +142,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         }
     }
 
-    /// Whether a mirror or glass is seen.
+    /// Whether glass is seen, or a mirror in which there may be something bright: of its pixels more has to be alike.
     fn shows_points(&self, seen: &TracedProbe) -> bool {
         seen.probe.smooth.is_some_and(|smooth| !self.job.appearance.reflects_little(smooth.mesh))
     }

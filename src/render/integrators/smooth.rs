@@ -15,10 +15,10 @@ use crate::scene::camera::Camera;
 use crate::scene::description::Albedo;
 use glam::{DVec3, Vec3};
 
-/// Radiance of what is seen in a mirror of which a pixel may miss a point. When pixels of all mirrors were settled as readily as others
+/// Radiance by reflection, at most, of a point that a pixel may miss. When pixels of all mirrors were settled as readily as others
 /// (`samples`), four of 100 pictures of mirrors of 0.5 and 0.9 lost one glint more, and chess lost one on its board, which reflects
 /// 0.07 of lights as bright as 16; of those below this, none of 100 lost any.
-const MOST_OF_A_POINT: f32 = 0.25;
+const MOST_UNSEEN: f32 = 0.25;
 
 /// A sample and what can be interpolated of it.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +51,7 @@ pub(in crate::render) struct Smooth {
     /// Equal for samples whose secondary rays hit the same meshes, on the same cube of a pattern, and had the same lights.
     pub signature: u64,
     /// Unit normals of what is seen by reflection and refraction, each times the share of its light that reaches the eye.
-    pub mirrored: Vec3,
+    pub mirrored_normal: Vec3,
 }
 
 /// Lights by number.
@@ -95,7 +95,7 @@ pub(super) struct Trail {
     first_lights: LightMasks,
     first_local: Vec3,
     signature: u64,
-    mirrored: Vec3,
+    mirrored_normal: Vec3,
 }
 
 impl Trail {
@@ -122,7 +122,7 @@ impl Trail {
 
     /// What a secondary ray of this weight hit.
     pub fn note_mirrored(&mut self, weight: Vec3, normal: DVec3) {
-        self.mirrored += weight.max_element() * normal.as_vec3();
+        self.mirrored_normal += weight.max_element() * normal.as_vec3();
     }
 
     pub fn note_light(&mut self, number: usize, state: LightState) {
@@ -152,7 +152,7 @@ impl<T: Tracer> Shader<'_, T> {
             secondary: sample.radiance - self.trail.first_local,
             lights: self.trail.first_lights,
             signature: self.trail.signature,
-            mirrored: self.trail.mirrored,
+            mirrored_normal: self.trail.mirrored_normal,
         });
         Probe { sample, smooth }
     }
@@ -176,11 +176,11 @@ impl Appearance {
         !self.any_glass && self.lights.len() <= LightMasks::CAPACITY
     }
 
-    /// Whether nothing that a mesh reflects is bright: in mirrors and glass, things and lights may be as small as points.
+    /// Whether nothing bright can be seen in a mesh's reflections: in mirrors and glass, things and lights may be as small as points.
     pub(in crate::render) fn reflects_little(&self, mesh: MeshId) -> bool {
         let material = &self.materials[mesh.idx()];
         let share = material.mirror.max_element();
-        material.glass.is_none() && (share == 0.0 || share * self.brightest <= MOST_OF_A_POINT)
+        material.glass.is_none() && (share == 0.0 || share * self.brightest <= MOST_UNSEEN)
     }
 
     /// Whether a mesh's colour changes faster than pixels may notice.
