@@ -10,7 +10,8 @@
 //! A secondary ray starts `1e-4 diag` above the hit along the geometric normal and is cosine-distributed about it; its two
 //! random numbers are hashes of (pixel, 2 sample) and (pixel, 2 sample + 1). Rays and results are f32, built before any
 //! clock starts. With `batch` above 0, secondary rays are handed over in batches of so many, for the tracer to put into
-//! an order of its own: no part of the recipe. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of
+//! an order of its own: no part of the recipe. Primary rays are traced one by one as the recipe has it, but the tracer is told the bounds of a task's rays before the first, within the time that counts,
+//! as a renderer would that knows its tile. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of
 //! the threads (`cpu`).
 
 use crate::io::process::thread_cpu;
@@ -219,7 +220,9 @@ impl Bench {
         let mut tiles: Vec<_> = split(&mut self.hits, starts);
         let mut pass = |threads| {
             parallel(threads, make_tracer, &mut tiles, |tracer, tile, hits| {
-                for (ray, hit) in primary[starts[tile]..starts[tile + 1]].iter().zip(hits.iter_mut()) {
+                let rays = &primary[starts[tile]..starts[tile + 1]];
+                tracer.aim(&rays.iter().map(BenchRay::ray).collect());
+                for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
                     *hit = tracer.closest(&ray.ray()).map_or(BenchHit::MISS, |h| bench_hit(&h));
                 }
             })

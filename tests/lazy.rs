@@ -97,14 +97,50 @@ fn batches_answer_as_single_rays_do() {
     }
 }
 
+#[test]
+fn taking_aim_changes_no_answer() {
+    let mut random = Random(0xa1_4ed0);
+    let mut n_hits = 0;
+    for (name, mesh) in shapes::all() {
+        let turned = DAffine3::from_rotation_y(0.7) * DAffine3::from_scale(DVec3::new(-1.0, 0.5, 2.0));
+        let places = [DAffine3::IDENTITY, DAffine3::from_translation(DVec3::new(0.5, 1.5, -0.3)) * turned];
+        let parts = places.map(|place| (mesh.clone(), place, DicingRate::Fixed(9)));
+        let world = world_of(parts.into_iter().take(1 + random.below(2)).collect());
+        let cache = cache_of(&world, CacheConfig::with_bytes(16 << 20));
+        let [mut plain, mut aimed] = [Intersector::new(&world, &cache), Intersector::new(&world, &cache)];
+        let bounds = world.meshes().iter().map(WorldMesh::bounds_in_world).fold(DBounds::EMPTY, DBounds::union);
+        for _ in 0..20 {
+            let eye = bounds.center() + 10f64.powi(random.below(4) as i32 - 1) * bounds.diagonal() * random.in_cube();
+            let spread = [0.0, 0.01, 0.1, 1.0][random.below(4)];
+            let forward = bounds.center() + 0.5 * bounds.diagonal() * random.in_cube() - eye;
+            let rays: Vec<Ray> =
+                (0..30).map(|_| Ray::new(eye, forward + spread * forward.length() * random.in_cube())).collect();
+            aimed.aim(&rays[..20].iter().copied().collect());
+            // The last ten are of the bundle or not; then come rays that start elsewhere.
+            let onward: Vec<Ray> = rays.iter().filter_map(|ray| onward(ray, &mut plain, &mut random)).collect();
+            for ray in rays.iter().chain(&onward) {
+                let (wanted, hit) = (plain.closest(ray), aimed.closest(ray));
+                assert_eq!(format!("{hit:?}"), format!("{wanted:?}"), "{name}, {ray:?}");
+                n_hits += usize::from(hit.is_some());
+            }
+        }
+    }
+    assert!(n_hits > 1000, "only {n_hits} rays hit anything");
+}
+
+/// A ray that goes on from where one hits.
+fn onward(ray: &Ray, tracer: &mut Intersector<'_>, random: &mut Random) -> Option<Ray> {
+    let hit = tracer.closest(ray)?;
+    let origin = ray.origin + f64::from(hit.t) * ray.direction;
+    Some(Ray { from: Some(hit.primitive), t_max: 2.0, ..Ray::new(origin, random.in_cube()) })
+}
+
 /// Random rays, and those that go on from their hits, shuffled.
 fn rays_and_onward_rays(world: &World, tracer: &mut Intersector<'_>, random: &mut Random) -> Vec<Ray> {
     let bounds = world.meshes().iter().map(WorldMesh::bounds_in_world).fold(DBounds::EMPTY, DBounds::union);
     let mut rays: Vec<Ray> = (0..100).map(|_| random.ray(bounds)).collect();
     for i in 0..rays.len() {
-        let Some(hit) = tracer.closest(&rays[i]) else { continue };
-        let origin = rays[i].origin + f64::from(hit.t) * rays[i].direction;
-        rays.push(Ray { from: Some(hit.primitive), t_max: 2.0, ..Ray::new(origin, random.in_cube()) });
+        rays.extend(onward(&rays[i], tracer, random));
     }
     for i in (1..rays.len()).rev() {
         rays.swap(i, random.below(i + 1));

@@ -9,4 +9,4 @@ pub mod simd;
 pub use bounds::{Bounds, DBounds};
 pub use lattice_grid::{LatticeGrid, Rounding, WINDOW};
 pub use point_grid::PointGrid;
-pub use ray::{Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
+pub use ray::{Hit, Intersect, OnTriangle, PrimitiveRef, Ray, RayBounds};

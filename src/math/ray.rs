@@ -1,7 +1,7 @@
 //! Rays in world space and what they hit.
 
 use crate::ids::{FaceId, MeshId, PatchId};
-use glam::{DVec3, Vec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 /// One triangle of the tessellation, named so that a ray that starts on it can leave it out.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -33,6 +33,52 @@ impl Ray {
     /// A ray without end.
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
         Self { origin, direction, t_max: f32::INFINITY, from: None }
+    }
+}
+
+/// A bundle of rays: those whose origin and direction lie within bounds, ends included. The length of a direction counts as it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayBounds {
+    /// Least and greatest origin, axis by axis.
+    pub origin: [DVec3; 2],
+    /// Least and greatest direction.
+    pub direction: [DVec3; 2],
+}
+
+impl RayBounds {
+    /// No ray.
+    pub const EMPTY: Self = {
+        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        Self { origin: none, direction: none }
+    };
+
+    /// Whether the ray is one of them.
+    #[inline(always)]
+    pub fn holds(&self, ray: &Ray) -> bool {
+        let is_between = |v: DVec3, [low, high]: [DVec3; 2]| (low.cmple(v) & v.cmple(high)).all();
+        is_between(ray.origin, self.origin) && is_between(ray.direction, self.direction)
+    }
+
+    /// Bounds of these rays in another space. Rays that were not among these may be within them.
+    pub fn transformed(&self, to: &DAffine3) -> Self {
+        let around = |[low, high]: [DVec3; 2], origin: DVec3| {
+            let (center, half) = (0.5 * (low + high), 0.5 * (high - low));
+            let columns = [to.matrix3.x_axis, to.matrix3.y_axis, to.matrix3.z_axis].map(DVec3::abs);
+            let half = half.x * columns[0] + half.y * columns[1] + half.z * columns[2];
+            let center = to.matrix3 * center + origin;
+            [center - half, center + half]
+        };
+        Self { origin: around(self.origin, to.translation), direction: around(self.direction, DVec3::ZERO) }
+    }
+}
+
+impl FromIterator<Ray> for RayBounds {
+    fn from_iter<I: IntoIterator<Item = Ray>>(rays: I) -> Self {
+        let with = |[low, high]: [DVec3; 2], v: DVec3| [low.min(v), high.max(v)];
+        rays.into_iter().fold(Self::EMPTY, |bounds, ray| Self {
+            origin: with(bounds.origin, ray.origin),
+            direction: with(bounds.direction, ray.direction),
+        })
     }
 }
 
@@ -72,6 +118,8 @@ pub trait Intersect {
     fn closest(&mut self, ray: &Ray) -> Option<Hit>;
     /// Whether anything is hit.
     fn occluded(&mut self, ray: &Ray) -> bool;
+    /// Announces rays: many of the next ones that [`closest`](Self::closest) is asked about are of this bundle. Answers do not depend on it.
+    fn aim(&mut self, _bundle: &RayBounds) {}
     /// [`closest`](Self::closest) for each of the rays, in whatever order is fast; `hits` is as long as `rays`.
     fn closest_batch(&mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len());

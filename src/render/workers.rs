@@ -58,6 +58,7 @@ pub fn render<T: Tracer>(
         let mut records = Vec::with_capacity((run.tile_side as usize).pow(2).min(settings.window.n_pixels()));
         while let Some(tile) = queue.next_tile() {
             records.clear();
+            shader.aim(camera, tile);
             records.extend(tile.pixels().map(|pixel| pixels.trace(&mut shader, pixel)));
             film.lock().store(tile, &records);
             queue.report(tile.n_pixels());

@@ -1,7 +1,7 @@
 //! The pinhole camera and its primary rays.
 
 use super::description::CameraDescription;
-use crate::math::{DBounds, Ray};
+use crate::math::{DBounds, Ray, RayBounds};
 use glam::{DVec2, DVec3};
 
 /// Vertical field of view of the default camera, in degrees.
@@ -67,6 +67,19 @@ impl Camera {
         Ray::new(self.eye, (self.forward + sx * self.right + sy * self.up).normalize())
     }
 
+    /// The bundle of the rays through a part of a picture of `size` pixels, between two corners in pixels.
+    ///
+    /// A component of a direction of length 1 differs from a blend of those at the corners by an eighth of the second derivatives, which are 3 at most, times the squares of
+    /// the sides on the plane at distance 1.
+    pub fn bundle(&self, [low, high]: [DVec2; 2], size: [u32; 2]) -> RayBounds {
+        let corners = [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)];
+        let bundle: RayBounds = corners.into_iter().map(|corner| self.ray(corner, size)).collect();
+        let sides = (high - low) * (2.0 * self.tan_half_fov / f64::from(size[1]));
+        let [least, greatest] = bundle.direction;
+        let bulge = 0.375 * sides.length_squared();
+        RayBounds { direction: [least - bulge, greatest + bulge], ..bundle }
+    }
+
     /// Coordinates of a point of world space along right, up and forward, from the eye. The last is its depth.
     pub fn view_from_world(&self, p: DVec3) -> DVec3 {
         self.view_from_world_vector(p - self.eye)
@@ -122,6 +135,25 @@ mod tests {
     fn the_middle_of_the_picture_looks_forward() {
         let ray = cube_camera().ray(DVec2::new(400.0, 300.0), [800, 600]);
         assert!((ray.direction - cube_camera().forward()).length() < 1e-15);
+    }
+
+    #[test]
+    fn the_bundle_of_a_tile_holds_its_rays_and_few_others() {
+        for (size, side) in [([640, 480], 16.0), ([64, 48], 64.0), ([100, 800], 3.0)] {
+            let [width, height] = size.map(f64::from);
+            let low = DVec2::new(0.3 * width, 0.7 * height).floor();
+            let corners = [low, (low + side).min(DVec2::new(width, height))];
+            let bundle = cube_camera().bundle(corners, size);
+            for k in 0..=400 {
+                let place = DVec2::new(f64::from(k % 21), f64::from(k / 21)) / DVec2::new(20.0, 19.05);
+                let ray = cube_camera().ray(corners[0] + place * (corners[1] - corners[0]), size);
+                assert!(bundle.holds(&ray), "{size:?}, {place}");
+            }
+            for beyond in [DVec2::new(-1.5, 0.5), DVec2::new(0.5, 4.0)] {
+                let ray = cube_camera().ray(corners[0] + beyond * (corners[1] - corners[0]), size);
+                assert!(!bundle.holds(&ray), "{size:?}, {beyond}");
+            }
+        }
     }
 
     #[test]

@@ -24,24 +24,28 @@ impl Entrance {
         }
     }
 
-    /// Origin and direction of the ray in lattice space, in lanes 0 to 2, if it comes within reach: the lengths of t stay.
-    ///
-    /// A ray within a plane of the box gives 0 * infinity on that axis; the comparisons pass over it.
+    /// Origin and direction of the ray in lattice space, in lanes 0 to 2: the lengths of t stay.
     #[inline(always)]
-    pub fn ray_in_reach<K: Kernel>(&self, k: K, ray: &Ray) -> Option<[K::D; 2]> {
+    pub fn ray<K: Kernel>(&self, k: K, ray: &Ray) -> [K::D; 2] {
         let [x, y, z, translation] = &self.columns;
         let (x, y, z) = (k.load4(x), k.load4(y), k.load4(z));
         // Components one by one: whoever made the ray has just written them one by one, and a wider load would wait for that.
         let origin = k.add4(turned(k, [x, y, z], ray.origin), k.load4(translation));
-        let direction = turned(k, [x, y, z], ray.direction);
+        [origin, turned(k, [x, y, z], ray.direction)]
+    }
+
+    /// Whether such a ray comes within reach.
+    ///
+    /// A ray within a plane of the box gives 0 * infinity on that axis; the comparisons pass over it.
+    #[inline(always)]
+    pub fn is_in_reach<K: Kernel>(&self, k: K, [origin, direction]: [K::D; 2]) -> bool {
         let inverse = k.div4(k.splat4(1.0), direction);
         let a = k.mul4(k.sub4(k.load4(&self.reach[0]), origin), inverse);
         let b = k.mul4(k.sub4(k.load4(&self.reach[1]), origin), inverse);
         let (low, high) = (k.store4(k.min4(a, b)), k.store4(k.max4(a, b)));
         let enter = later(low[2], later(low[1], later(low[0], 0.0)));
         let leave = sooner(high[2], sooner(high[1], sooner(high[0], f64::INFINITY)));
-        let is_in_reach = enter <= leave * (1.0 + 1e-9);
-        is_in_reach.then_some([origin, direction])
+        enter <= leave * (1.0 + 1e-9)
     }
 }
 

@@ -4,19 +4,20 @@
 //! 8 x 8 cells, else a node whose children are nodes or pieces in their turn. A block that is missing is built on the
 //! spot, so nothing is tessellated but what a ray reaches.
 //!
-//! `entrance.rs` takes a ray into a mesh's lattice, `accel` to its patches, `patch_walk.rs` through a patch; `builder.rs`
+//! `entrance.rs` takes a ray into a mesh's lattice, `aim.rs` and `accel` to its patches, `patch_walk.rs` through a patch; `builder.rs`
 //! builds what is missing.
 
-use super::accel::TraversalStack;
+use super::accel::{LeafWalk, TraversalStack};
+use super::aim::{Aim, TakeAim};
 use super::batch::{BatchOrder, MOST_RAYS};
 use super::builder::{Builder, PatchContext};
 use super::patch_walk::{ClosestInPatch, InPatch, OccludedInPatch};
 use super::world::{GridCache, World, WorldMesh};
-use crate::cache::{Pin, SlotId, TraceLog};
+use crate::cache::{Pin, SlotId, TraceLog, Visit};
 use crate::grid::{LatticeHit, LatticeRay, TriangleId};
 use crate::ids::MeshId;
 use crate::math::simd::{self, Best, Kernel, Task};
-use crate::math::{DBounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray};
+use crate::math::{DBounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray, RayBounds};
 use crate::subdiv::Dicer;
 use glam::DVec3;
 
@@ -53,6 +54,7 @@ pub struct Intersector<'w> {
     /// Remembers other patches than the builder's: those that shading asks about.
     shading: Dicer,
     stacks: Stacks,
+    aim: Aim,
     order: BatchOrder,
     kernel: Best,
 }
@@ -88,12 +90,63 @@ impl Task for ClosestInMesh<'_, '_> {
         let Self { tracer, mesh: id, ray, t_max } = self;
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
-        let entering = mesh.entrance().ray_in_reach(kernel, ray)?;
+        let entering = mesh.entrance().ray(kernel, ray);
+        if !mesh.entrance().is_in_reach(kernel, entering) {
+            return None;
+        }
         let ray = &lattice_ray(kernel, entering, id, ray, t_max);
+        let walk = mesh.top().walk(kernel, ray, &mut stacks.mesh);
+        Leaves { id, mesh, cache, visit: &pin.visit(), builder, ray }.closest(kernel, walk)
+    }
+}
+
+/// As [`ClosestInMesh`], from one of the aim's fronts, by number, if the ray is of its bundle.
+struct ClosestInFront<'a, 'w> {
+    tracer: &'a mut Intersector<'w>,
+    front: usize,
+    ray: &'a Ray,
+    t_max: f32,
+}
+
+impl Task for ClosestInFront<'_, '_> {
+    type Output = Option<Hit>;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> Option<Hit> {
+        let Self { tracer, front, ray, t_max } = self;
+        let Intersector { world, cache, pin, builder, stacks, aim, .. } = &mut *tracer;
+        let (id, front) = aim.front(front);
+        let mesh = world.mesh(id);
+        let entering = mesh.entrance().ray(kernel, ray);
+        if !front.holds(kernel, entering) {
+            return kernel.enter(ClosestInMesh { tracer, mesh: id, ray, t_max });
+        }
+        if front.is_empty() {
+            return None;
+        }
+        let ray = &lattice_ray(kernel, entering, id, ray, t_max);
+        let walk = mesh.top().walk_front(kernel, front, ray, &mut stacks.mesh);
+        Leaves { id, mesh, cache, visit: &pin.visit(), builder, ray }.closest(kernel, walk)
+    }
+}
+
+/// A ray about to visit leaves.
+struct Leaves<'a, 'v, 'p, 'w> {
+    id: MeshId,
+    mesh: &'w WorldMesh,
+    cache: &'w GridCache,
+    visit: &'v Visit<'p>,
+    builder: &'a mut Builder<'w>,
+    ray: &'a LatticeRay,
+}
+
+impl Leaves<'_, '_, '_, '_> {
+    /// The nearest hit on the way.
+    #[inline(always)]
+    fn closest<K: Kernel>(self, kernel: K, mut walk: impl LeafWalk) -> Option<Hit> {
+        let Self { id, mesh, cache, visit, builder, ray } = self;
         let hit = &mut LatticeHit::none(ray.t_max());
         let table = cache.table(id);
-        let visit = &pin.visit();
-        let mut walk = mesh.top().walk(kernel, ray, &mut stacks.mesh);
         while let Some(leaf) = walk.nearest(hit.t, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             if let Some(block) = visit.get(visit.root(table, SlotId(leaf.slot))) {
@@ -124,7 +177,10 @@ impl Task for OccludedInMesh<'_, '_> {
         let Self { tracer, mesh: id, ray } = self;
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
-        let Some(entering) = mesh.entrance().ray_in_reach(kernel, ray) else { return false };
+        let entering = mesh.entrance().ray(kernel, ray);
+        if !mesh.entrance().is_in_reach(kernel, entering) {
+            return false;
+        }
         let ray = &lattice_ray(kernel, entering, id, ray, ray.t_max);
         let table = cache.table(id);
         let visit = &pin.visit();
@@ -183,6 +239,7 @@ impl<'w> Intersector<'w> {
             builder: Builder::noting(cache.trace().map(TraceLog::recorder)),
             shading: Dicer::default(),
             stacks: Stacks::default(),
+            aim: Aim::default(),
             order: BatchOrder::new(boxes.fold(DBounds::EMPTY, DBounds::union)),
             kernel: Best::detect(),
         }
@@ -227,10 +284,7 @@ impl<'w> Intersector<'w> {
     fn closest_in_mesh(&mut self, mesh: MeshId, ray: &Ray, best: &mut Option<Hit>) {
         let t_max = best.map_or(ray.t_max, |hit| hit.t);
         let found = self.kernel.run(ClosestInMesh { tracer: self, mesh, ray, t_max });
-        let Some(hit) = found else { return };
-        if best.is_none_or(|b| hit.t < b.t || (hit.t == b.t && mesh < b.primitive.mesh)) {
-            *best = found;
-        }
+        *best = nearer(*best, found);
     }
 
     /// The nearest hit where there are several meshes. (Apart, so that one mesh does not pay for its stack frame.)
@@ -248,6 +302,15 @@ impl<'w> Intersector<'w> {
         });
         self.stacks.scene = stack;
         best
+    }
+
+    /// The nearest hit of a ray of the bundle that was aimed along, where there are several meshes.
+    #[inline(never)]
+    fn closest_of_fronts(&mut self, ray: &Ray) -> Option<Hit> {
+        (0..self.aim.n_meshes()).fold(None, |best: Option<Hit>, front| {
+            let t_max = best.map_or(ray.t_max, |hit| hit.t);
+            nearer(best, self.kernel.run(ClosestInFront { tracer: self, front, ray, t_max }))
+        })
     }
 
     /// Whether anything is hit where there are several meshes.
@@ -272,6 +335,13 @@ impl<'w> Intersector<'w> {
     }
 }
 
+/// The nearer hit of two, of two at the same distance that of the smaller mesh.
+#[inline(always)]
+fn nearer(best: Option<Hit>, found: Option<Hit>) -> Option<Hit> {
+    let (Some(b), Some(hit)) = (best, found) else { return best.or(found) };
+    if hit.t < b.t || (hit.t == b.t && hit.primitive.mesh < b.primitive.mesh) { found } else { best }
+}
+
 fn triangle_id(of: &PrimitiveRef) -> TriangleId {
     let [i, j] = of.cell.map(u32::from);
     TriangleId::new(of.patch, i, j, u32::from(of.half))
@@ -286,8 +356,15 @@ impl Drop for Intersector<'_> {
 
 impl Intersect for Intersector<'_> {
     fn closest(&mut self, ray: &Ray) -> Option<Hit> {
+        let (kernel, t_max) = (self.kernel, ray.t_max);
         if self.world.meshes().len() == 1 {
-            return self.kernel.run(ClosestInMesh { tracer: self, mesh: MeshId(0), ray, t_max: ray.t_max });
+            return match self.aim.may_hold(ray) {
+                true => kernel.run(ClosestInFront { tracer: self, front: 0, ray, t_max }),
+                false => kernel.run(ClosestInMesh { tracer: self, mesh: MeshId(0), ray, t_max }),
+            };
+        }
+        if self.aim.may_hold(ray) && self.aim.holds(ray) {
+            return self.closest_of_fronts(ray);
         }
         self.closest_of_meshes(ray)
     }
@@ -297,6 +374,11 @@ impl Intersect for Intersector<'_> {
             return self.kernel.run(OccludedInMesh { tracer: self, mesh: MeshId(0), ray });
         }
         self.occluded_by_meshes(ray)
+    }
+
+    fn aim(&mut self, bundle: &RayBounds) {
+        let Self { world, aim, kernel, .. } = self;
+        kernel.run(TakeAim { aim, world, bundle });
     }
 
     fn closest_batch(&mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {

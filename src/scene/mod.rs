@@ -3,6 +3,7 @@
 //! A [`description::SceneDescription`] is what the user wrote, checked but with no mesh read.
 
 pub mod accel;
+mod aim;
 mod batch;
 mod builder;
 pub mod camera;

@@ -24,11 +24,12 @@ use super::film::FirstHit;
 use super::rays::{RayCounts, RayKind};
 use super::sampler::Sampler;
 use super::settings::{Appearance, RenderSettings};
+use super::tiles::PixelRect;
 use super::tracer::{Built, Tracer};
 use crate::math::Ray;
 use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
-use glam::Vec3;
+use glam::{DVec2, Vec3};
 use interaction::Interaction;
 use smooth::Trail;
 pub(super) use smooth::{LightMasks, Probe, Smooth, SmoothPoint};
@@ -67,6 +68,12 @@ impl<'a, T: Tracer> Shader<'a, T> {
     /// Blocks that the tracer has built so far.
     pub fn misses(&self) -> Built {
         self.tracer.misses()
+    }
+
+    /// Announces that many of the next camera rays go through a part of the picture.
+    pub(super) fn aim(&mut self, camera: &Camera, part: PixelRect) {
+        let corners = [[part.x0, part.y0], [part.x1, part.y1]].map(|corner| DVec2::from(corner.map(f64::from)));
+        self.tracer.aim(&camera.bundle(corners, self.settings.size));
     }
 
     /// Traces a ray of `camera` and gathers light by the integrator of the settings.

@@ -19,10 +19,12 @@
 //!    are visited too, so that ties are seen.
 //! 4. No arrangement of boxes makes the tree deep or its build quadratic.
 //!
-//! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs). Read `traverse.rs` first.
+//! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs). Read `traverse.rs` first;
+//! `front.rs` lets rays that are much alike begin further down.
 
 mod build;
 mod collapse;
+mod front;
 mod groups;
 mod parts;
 mod traverse;
@@ -31,6 +33,7 @@ mod visit;
 use crate::ids::PatchId;
 
 pub use build::BUILD_BYTES_PER_PATCH;
+pub use front::{Front, FrontWalk};
 pub use traverse::{AnyWalk, TraversalStack, Walk};
 
 /// A leaf of the tree.
@@ -40,6 +43,13 @@ pub struct LeafRef {
     pub slot: u32,
     /// The patch, as its index in the boxes that the tree was built over.
     pub patch: PatchId,
+}
+
+/// A ray's way from leaf to leaf.
+pub trait LeafWalk {
+    /// The next patch whose box the ray meets before `t_max`, the nearest of each node first. `prefetch` is called with a leaf's slot
+    /// when the leaf before it in the same node is handed out.
+    fn nearest(&mut self, t_max: f32, prefetch: impl Fn(u32)) -> Option<LeafRef>;
 }
 
 /// Lanes of a node.

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::grid::{LatticeRay, TriangleId};
-use crate::math::Bounds;
 use crate::math::simd::{Kernel, Portable, Task, run};
+use crate::math::{Bounds, Ray, RayBounds};
 use glam::{DVec3, Vec3};
 
 /// Numbers in [0, 1) that are the same in every run.
@@ -153,6 +153,71 @@ fn occlusion_stops_at_the_first_hit() {
     };
     assert!(tree.occluded(Portable, &ray(DVec3::ZERO, DVec3::ONE), &mut TraversalStack::default(), first));
     assert_eq!(n_visits, 1);
+}
+
+/// The leaves that a ray visits from the root, and those that it visits from a bundle's front, each by their slots; `None` if there is no front.
+struct FromFront<'a>(&'a TopLevel, &'a RayBounds, &'a LatticeRay);
+
+impl Task for FromFront<'_> {
+    type Output = Option<[Vec<u32>; 2]>;
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> Self::Output {
+        let Self(tree, bundle, ray) = self;
+        let mut front = Front::default();
+        if !tree.find_front(kernel, bundle, &mut front) {
+            return None;
+        }
+        let mut stacks = [TraversalStack::default(), TraversalStack::default()];
+        let [first, second] = &mut stacks;
+        let from_root = slots(tree.walk(kernel, ray, first));
+        let is_empty = front.is_empty();
+        let from_front = if is_empty { vec![] } else { slots(tree.walk_front(kernel, &front, ray, second)) };
+        Some([from_root, from_front])
+    }
+}
+
+fn slots(mut walk: impl LeafWalk) -> Vec<u32> {
+    let mut slots: Vec<_> = std::iter::from_fn(|| walk.nearest(f32::INFINITY, |_| ())).map(|leaf| leaf.slot).collect();
+    slots.sort_unstable();
+    slots
+}
+
+#[test]
+fn from_its_front_a_ray_of_a_bundle_visits_what_it_visits_from_the_root() {
+    let mut n_leaves = 0;
+    for (size, n) in [(10.0, 1), (1e6, 2), (2e5, 3000), (3e6, 400)] {
+        let tree = TopLevel::build(&scattered(n, size), 2);
+        for i in 0..600 {
+            // From a point or a box, in one direction or within an angle, some of which have no sign along an axis.
+            let axis = [DVec3::X, DVec3::NEG_Y, DVec3::new(0.0, 1.0, -1.0), random_point(i, 1.0)][i as usize % 4];
+            let [around, spread] = [[0.0, 1e2, 1e6], [0.0, 1e-3, 0.3]].map(|of| of[(random(i) * 3.0) as usize]);
+            let eye = random_point(i + 600, 10f64.powi(2 + i as i32 % 6));
+            let [o, d] = [0, 1].map(|end| random_point(2 * i + end, 1.0));
+            let corners = [(eye, axis), (eye + around * o, axis + spread * d)].map(|(o, d)| Ray::new(o, d));
+            let bundle: RayBounds = corners.into_iter().collect();
+            for k in 0..4 {
+                let blend = |[low, high]: [DVec3; 2]| {
+                    low + DVec3::from_array([0, 1, 2].map(|a| random(9 * i + 3 * k + a))) * (high - low)
+                };
+                let ray = ray(blend(bundle.origin), blend(bundle.direction));
+                for visits in [run(FromFront(&tree, &bundle, &ray)), FromFront(&tree, &bundle, &ray).run(Portable)] {
+                    let [from_root, from_front] = visits.expect("the eye is near");
+                    assert_eq!(from_root, from_front, "{n} boxes, bundle {i}, ray {k}");
+                    n_leaves += from_root.len();
+                }
+            }
+        }
+    }
+    assert!(n_leaves > 10_000, "only {n_leaves} leaves were visited");
+}
+
+#[test]
+fn bundles_from_very_far_away_or_of_no_numbers_have_no_front() {
+    let tree = TopLevel::build(&scattered(100, 1e6), 1);
+    for eye in [DVec3::splat(1e9), DVec3::splat(f64::NAN), DVec3::new(f64::NEG_INFINITY, 0.0, 0.0)] {
+        let bundle: RayBounds = [Ray::new(eye, -eye)].into_iter().collect();
+        assert!(!tree.find_front(Portable, &bundle, &mut Front::default()), "{eye}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Rays through the wide tree.
 
-use super::{LANES, LEAF, LeafRef, NodeBoxes, Refs, TopLevel};
+use super::{LANES, LEAF, LeafRef, LeafWalk, NodeBoxes, Refs, TopLevel};
 use crate::grid::{LatticeRay, Plane};
 use crate::ids::PatchId;
 use crate::math::simd::{Kernel, place};
@@ -25,9 +25,21 @@ impl TopLevel {
     /// A walk along a ray, at its start.
     #[inline(always)]
     pub fn walk<'t, K: Kernel>(&'t self, kernel: K, ray: &'t LatticeRay, stack: &'t mut TraversalStack) -> Walk<'t, K> {
+        let mut walk = self.walk_below(kernel, ray, stack);
+        walk.start_at(0, ray.t_max);
+        walk
+    }
+
+    /// A walk along a ray that has still to be [started](Walk::start_at) at a node.
+    #[inline(always)]
+    pub(super) fn walk_below<'t, K: Kernel>(
+        &'t self,
+        kernel: K,
+        ray: &'t LatticeRay,
+        stack: &'t mut TraversalStack,
+    ) -> Walk<'t, K> {
         let (nodes, slabs) = (self.nodes(), Slabs::new(kernel, ray));
-        let (enter, leave) = slabs.test(kernel, &nodes.0[0], ray.t_max);
-        let order = kernel.in_order(enter, leave);
+        let order = kernel.load_order(&[K::LAST; LANES]);
         Walk { kernel, slabs, nodes, stack: stack.open_of_size(self.stack_need), n: 0, node: 0, order }
     }
 
@@ -105,10 +117,24 @@ pub struct Walk<'t, K: Kernel> {
 }
 
 impl<K: Kernel> Walk<'_, K> {
-    /// The next patch whose box the ray meets before `t_max`, the nearest of each node first. `prefetch` is called with a leaf's slot
-    /// when the leaf before it in the same node is handed out.
+    /// Goes on at a node, when there is nothing left to visit.
     #[inline(always)]
-    pub fn nearest(&mut self, t_max: f32, prefetch: impl Fn(u32)) -> Option<LeafRef> {
+    pub(super) fn start_at(&mut self, node: u32, t_max: f32) {
+        debug_assert!(self.n == 0);
+        (self.node, self.order) = (node, self.order_of(&self.nodes.0[node as usize], t_max));
+    }
+
+    /// The lanes that the ray meets before `t_max`, in the order of entry.
+    #[inline(always)]
+    pub(super) fn order_of(&self, boxes: &NodeBoxes, t_max: f32) -> K::O {
+        let (enter, leave) = self.slabs.test(self.kernel, boxes, t_max);
+        self.kernel.in_order(enter, leave)
+    }
+}
+
+impl<K: Kernel> LeafWalk for Walk<'_, K> {
+    #[inline(always)]
+    fn nearest(&mut self, t_max: f32, prefetch: impl Fn(u32)) -> Option<LeafRef> {
         let (k, last) = (self.kernel, place(t_max));
         loop {
             let (lane, place) = k.first(self.order);
@@ -134,8 +160,7 @@ impl<K: Kernel> Walk<'_, K> {
             }
             self.stack[self.n] = OpenNode { order: k.store_order(self.order), node: self.node };
             self.n += usize::from(k.has_any(self.order));
-            let (enter, leave) = self.slabs.test(k, &self.nodes.0[reference as usize], t_max);
-            (self.node, self.order) = (reference, k.in_order(enter, leave));
+            (self.node, self.order) = (reference, self.order_of(&self.nodes.0[reference as usize], t_max));
         }
     }
 }
