@@ -174,6 +174,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         records.clear();
         records.resize(tile.n_pixels(), self.job.background());
         self.tile.reset([tile.x0, tile.y0]);
+        self.shader.aim(self.job.camera, tile);
         if self.is_grouped() {
             (0..CELL_SIDES.len()).for_each(|level| self.refine(level));
         } else {
@@ -216,6 +217,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
             if matches!(self.tile.cell(&largest), Cell::Empty | Cell::Undivided) {
                 continue;
             }
+            self.shader.aim(self.job.camera, largest.pixels());
             let pixels = (first..first + per_cell).map(place);
             pixels.filter(|&pixel| tile.idx(pixel).is_some()).for_each(|pixel| visit(self, pixel));
         }
@@ -335,7 +337,11 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
 /// Every second bit, from bit 0: half of a place on the Z curve, along which neighbours follow one another.
 fn even_bits(k: u32) -> u32 {
-    (0..16).fold(0, |bits, i| bits | (k >> (2 * i) & 1) << i)
+    let k = k & 0x5555_5555;
+    let k = (k | k >> 1) & 0x3333_3333;
+    let k = (k | k >> 2) & 0x0f0f_0f0f;
+    let k = (k | k >> 4) & 0x00ff_00ff;
+    (k | k >> 8) & 0xffff
 }
 
 impl PixelRecord {

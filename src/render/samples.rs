@@ -17,7 +17,7 @@
 use super::adaptive::{CREASE_COSINE, Worker};
 use super::cells::{Cell, TracedProbe};
 use super::film::PixelRecord;
-use super::follow::{Shown, around, display_difference, follow};
+use super::follow::{Shown, around, follow};
 use super::tiles::PixelRect;
 use super::tracer::Tracer;
 use super::workers::Exposure;
@@ -97,9 +97,9 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// Traces a second sample of a pixel; whether it agrees with the first: what is smaller than a pixel, neighbours do not show.
     fn is_confirmed(&mut self, pixel: [u32; 2], exposure: &mut Exposure) -> bool {
-        let first = exposure.mean();
+        let Some(first) = self.tile.probe(pixel).map(|probe| probe.shown) else { return false };
         self.job.pixels().expose(&mut self.shader, pixel, exposure, SETTLED);
-        display_difference(first, exposure.mean()) <= 0.5 * self.job.settings.tolerance
+        first.difference(Shown::new(exposure.mean())) <= 0.5 * self.job.settings.tolerance
     }
 
     /// Whether a traced pixel and those around it, all of the tile, are alike.
