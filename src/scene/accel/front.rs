@@ -55,6 +55,8 @@ struct Group {
     refs: Refs,
     /// Leaf slots.
     slots: [u32; LANES],
+    /// Where the bundle enters the first of them, at least, in units of the rays' own directions.
+    enter: f32,
 }
 
 #[derive(Clone, Copy)]
@@ -118,7 +120,7 @@ impl Group {
         // No ray meets a lane that stays as it is.
         let [low, high] = [[f32::MAX; LANES], [f32::MIN; LANES]];
         let boxes = NodeBoxes { planes: [low, low, low, high, high, high] };
-        let mut group = Self { boxes, refs: [EMPTY; LANES], slots: [0; LANES] };
+        let mut group = Self { boxes, refs: [EMPTY; LANES], slots: [0; LANES], enter: items[0].enter };
         for (lane, item) in items.iter().enumerate() {
             (group.refs[lane], group.slots[lane]) = (item.reference, item.slot);
             group.boxes.planes.iter_mut().zip(item.planes).for_each(|(lanes, plane)| lanes[lane] = plane);
@@ -241,13 +243,14 @@ impl TopLevel {
         let (group, rest) = front.groups.split_first().expect("a front that is not empty");
         let below = self.walk_below(kernel, ray, stack);
         let order = below.order_of(&group.boxes, ray.t_max);
-        FrontWalk { kernel, below, is_below: false, group, rest, order }
+        FrontWalk { kernel, ray, below, is_below: false, group, rest, order }
     }
 }
 
 /// A ray's way along a front, from leaf to leaf.
 pub struct FrontWalk<'t, K: Kernel> {
     kernel: K,
+    ray: &'t LatticeRay,
     /// The way below a node of the front, while `is_below`.
     below: Walk<'t, K>,
     is_below: bool,
@@ -271,6 +274,9 @@ impl<K: Kernel> LeafWalk for FrontWalk<'_, K> {
             let (lane, place) = k.first(self.order);
             if place > last {
                 (self.group, self.rest) = self.rest.split_first()?;
+                if self.group.enter > self.ray.caller_t(t_max) {
+                    return None;
+                }
                 self.order = self.below.order_of(&self.group.boxes, t_max);
                 continue;
             }
