@@ -47,6 +47,9 @@ pub struct Front {
     open: Vec<Item>,
 }
 
+/// Bounds that no ray is within.
+const NO_RAY: [[f64; 4]; 4] = [[f64::NAN; 4]; 4];
+
 /// Eight leaves or nodes, tested like a node's children.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
@@ -71,7 +74,7 @@ struct Item {
 impl Default for Front {
     /// That of no ray.
     fn default() -> Self {
-        Self { bounds: [[f64::NAN; 4]; 4], groups: Vec::new(), items: Vec::new(), open: Vec::new() }
+        Self { bounds: NO_RAY, groups: Vec::new(), items: Vec::new(), open: Vec::new() }
     }
 }
 
@@ -133,17 +136,16 @@ impl TopLevel {
     /// Finds the front of a bundle in the tree's space. Returns whether there is one; there is none for origins that are too far away.
     #[inline(always)]
     pub fn find_front<K: Kernel>(&self, k: K, bundle: &RayBounds, front: &mut Front) -> bool {
-        front.bounds = Front::default().bounds;
+        front.bounds = NO_RAY;
         let Some(intervals) = Intervals::new(bundle) else { return false };
         front.set_bounds(bundle);
-        let bundle = intervals;
         let Front { items, open, .. } = front;
         items.clear();
         open.clear();
-        self.look_below(k, 0, &bundle, items, open);
+        self.look_below(k, 0, &intervals, items, open);
         let mut next = 0;
         while next < open.len() && items.len() + (open.len() - next) + LANES - 1 <= MOST_ITEMS {
-            self.look_below(k, open[next].reference, &bundle, items, open);
+            self.look_below(k, open[next].reference, &intervals, items, open);
             next += 1;
         }
         items.extend(&open[next..]);
