@@ -70,3 +70,19 @@ bounds!(
     /// A box in double precision.
     DBounds, DVec3, f64
 );
+
+impl DBounds {
+    /// Whether a point is inside or on the border.
+    #[inline]
+    pub fn contains(&self, p: DVec3) -> bool {
+        (self.min.cmple(p) & p.cmple(self.max)).all()
+    }
+
+    /// The eight corners; none of a box that holds nothing.
+    pub fn corners(self) -> impl Iterator<Item = DVec3> {
+        let Self { min, max } = self;
+        let pick = move |k: u32, axis: usize| if k >> axis & 1 == 0 { min[axis] } else { max[axis] };
+        let n = if self.is_empty() { 0 } else { 8 };
+        (0..n).map(move |k| DVec3::new(pick(k, 0), pick(k, 1), pick(k, 2)))
+    }
+}

@@ -1,5 +1,6 @@
 //! Rays in world space and what they hit.
 
+use super::DBounds;
 use crate::ids::{FaceId, MeshId, PatchId};
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -39,45 +40,37 @@ impl Ray {
 /// A bundle of rays: those whose origin and direction lie within bounds, ends included. The length of a direction counts as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayBounds {
-    /// Least and greatest origin, axis by axis.
-    pub origin: [DVec3; 2],
-    /// Least and greatest direction.
-    pub direction: [DVec3; 2],
+    /// Around the origins.
+    pub origin: DBounds,
+    /// Around the directions.
+    pub direction: DBounds,
 }
 
 impl RayBounds {
     /// No ray.
-    pub const EMPTY: Self = {
-        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-        Self { origin: none, direction: none }
-    };
+    pub const EMPTY: Self = Self { origin: DBounds::EMPTY, direction: DBounds::EMPTY };
 
     /// Whether the ray is one of them.
-    #[inline(always)]
-    pub fn holds(&self, ray: &Ray) -> bool {
-        let is_between = |v: DVec3, [low, high]: [DVec3; 2]| (low.cmple(v) & v.cmple(high)).all();
-        is_between(ray.origin, self.origin) && is_between(ray.direction, self.direction)
+    #[inline]
+    pub fn contains(&self, ray: &Ray) -> bool {
+        self.origin.contains(ray.origin) && self.direction.contains(ray.direction)
     }
 
     /// Bounds of these rays in another space. Rays that were not among these may be within them.
     pub fn transformed(&self, to: &DAffine3) -> Self {
-        let around = |[low, high]: [DVec3; 2], origin: DVec3| {
-            let (center, half) = (0.5 * (low + high), 0.5 * (high - low));
-            let columns = [to.matrix3.x_axis, to.matrix3.y_axis, to.matrix3.z_axis].map(DVec3::abs);
-            let half = half.x * columns[0] + half.y * columns[1] + half.z * columns[2];
-            let center = to.matrix3 * center + origin;
-            [center - half, center + half]
-        };
-        Self { origin: around(self.origin, to.translation), direction: around(self.direction, DVec3::ZERO) }
+        Self {
+            origin: self.origin.corners().map(|p| to.transform_point3(p)).collect(),
+            direction: self.direction.corners().map(|v| to.transform_vector3(v)).collect(),
+        }
     }
 }
 
 impl FromIterator<Ray> for RayBounds {
     fn from_iter<I: IntoIterator<Item = Ray>>(rays: I) -> Self {
-        let with = |[low, high]: [DVec3; 2], v: DVec3| [low.min(v), high.max(v)];
-        rays.into_iter().fold(Self::EMPTY, |bounds, ray| Self {
-            origin: with(bounds.origin, ray.origin),
-            direction: with(bounds.direction, ray.direction),
+        rays.into_iter().fold(Self::EMPTY, |mut bounds, ray| {
+            bounds.origin.grow(ray.origin);
+            bounds.direction.grow(ray.direction);
+            bounds
         })
     }
 }

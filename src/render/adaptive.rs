@@ -174,8 +174,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
         records.clear();
         records.resize(tile.n_pixels(), self.job.background());
         self.tile.reset([tile.x0, tile.y0]);
-        self.shader.aim(self.job.camera, tile);
         if self.is_grouped() {
+            self.shader.aim(self.job.camera, tile);
             (0..CELL_SIDES.len()).for_each(|level| self.refine(level));
         } else {
             self.split_all();

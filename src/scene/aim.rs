@@ -9,7 +9,7 @@ use super::accel::Front;
 use super::world::{World, WorldMesh};
 use crate::ids::MeshId;
 use crate::math::simd::{Kernel, Task};
-use crate::math::{Ray, RayBounds};
+use crate::math::{DBounds, Ray, RayBounds};
 
 /// Directions of a bundle differ by less than this share of their greatest component, axis by axis: rays that have less in common are
 /// traced from the root.
@@ -37,14 +37,14 @@ impl Default for Aim {
 impl Aim {
     /// Whether the ray may be of the bundle, seen from one coordinate: enough for rays that start elsewhere. If it may there is a front.
     #[inline(always)]
-    pub fn may_hold(&self, ray: &Ray) -> bool {
-        let [low, high] = self.bundle.origin;
-        low.x <= ray.origin.x && ray.origin.x <= high.x
+    pub fn may_contain(&self, ray: &Ray) -> bool {
+        let DBounds { min, max } = self.bundle.origin;
+        min.x <= ray.origin.x && ray.origin.x <= max.x
     }
 
     /// Whether it is.
-    pub fn holds(&self, ray: &Ray) -> bool {
-        self.bundle.holds(ray)
+    pub fn contains(&self, ray: &Ray) -> bool {
+        self.bundle.contains(ray)
     }
 
     /// How many meshes rays of the bundle may meet.
@@ -80,9 +80,9 @@ impl Task for TakeAim<'_> {
 }
 
 fn is_narrow(bundle: &RayBounds) -> bool {
-    let [low, high] = bundle.direction;
+    let DBounds { min, max } = bundle.direction;
     // False for NaN.
-    (high - low).max_element() < MOST_SPREAD * low.abs().max(high.abs()).max_element()
+    (max - min).max_element() < MOST_SPREAD * min.abs().max(max.abs()).max_element()
 }
 
 impl Aim {

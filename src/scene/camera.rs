@@ -75,9 +75,7 @@ impl Camera {
         let corners = [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)];
         let bundle: RayBounds = corners.into_iter().map(|corner| self.ray(corner, size)).collect();
         let sides = (high - low) * (2.0 * self.tan_half_fov / f64::from(size[1]));
-        let [least, greatest] = bundle.direction;
-        let bulge = 0.375 * sides.length_squared();
-        RayBounds { direction: [least - bulge, greatest + bulge], ..bundle }
+        RayBounds { direction: bundle.direction.expanded(0.375 * sides.length_squared()), ..bundle }
     }
 
     /// Coordinates of a point of world space along right, up and forward, from the eye. The last is its depth.
@@ -147,11 +145,11 @@ mod tests {
             for k in 0..=400 {
                 let place = DVec2::new(f64::from(k % 21), f64::from(k / 21)) / DVec2::new(20.0, 19.05);
                 let ray = cube_camera().ray(corners[0] + place * (corners[1] - corners[0]), size);
-                assert!(bundle.holds(&ray), "{size:?}, {place}");
+                assert!(bundle.contains(&ray), "{size:?}, {place}");
             }
             for beyond in [DVec2::new(-1.5, 0.5), DVec2::new(0.5, 4.0)] {
                 let ray = cube_camera().ray(corners[0] + beyond * (corners[1] - corners[0]), size);
-                assert!(!bundle.holds(&ray), "{size:?}, {beyond}");
+                assert!(!bundle.contains(&ray), "{size:?}, {beyond}");
             }
         }
     }

@@ -8,26 +8,17 @@ use crate::error::Result;
 use crate::math::DBounds;
 use crate::mesh::ControlMesh;
 use crate::scene::description::CameraDescription;
-use glam::DVec3;
 
 /// The camera of a description: its own, or one that frames all meshes. `meshes[i]` belongs to `description.meshes[i]`.
 pub fn camera_of(description: &SceneDescription, meshes: &[ControlMesh]) -> CameraDescription {
     let framed = || {
         let boxes = description.meshes.iter().zip(meshes).map(|(d, mesh)| {
-            let corners = corners(mesh.bounds());
+            let corners = mesh.bounds().corners();
             corners.map(|p| d.world_from_object.transform_point3(p)).collect::<DBounds>()
         });
         CameraDescription::framing(boxes.fold(DBounds::EMPTY, DBounds::union))
     };
     description.camera.unwrap_or_else(framed)
-}
-
-fn corners(b: DBounds) -> impl Iterator<Item = DVec3> {
-    let pick = |k: u32, axis: u32, a: f64, b: f64| if (k >> axis) & 1 == 0 { a } else { b };
-    let n = if b.is_empty() { 0 } else { 8 };
-    (0..n).map(move |k| {
-        DVec3::new(pick(k, 0, b.min.x, b.max.x), pick(k, 1, b.min.y, b.max.y), pick(k, 2, b.min.z, b.max.z))
-    })
 }
 
 /// Prepares all meshes for tracing. Every mesh of the description must have its rate; pixels are those of a picture

@@ -118,7 +118,7 @@ impl Task for ClosestInFront<'_, '_> {
         let (id, front) = aim.front(front);
         let mesh = world.mesh(id);
         let entering = mesh.entrance().ray(kernel, ray);
-        if !front.holds(kernel, entering) {
+        if !front.contains(kernel, entering) {
             return kernel.enter(ClosestInMesh { tracer, mesh: id, ray, t_max });
         }
         if front.is_empty() {
@@ -358,12 +358,12 @@ impl Intersect for Intersector<'_> {
     fn closest(&mut self, ray: &Ray) -> Option<Hit> {
         let (kernel, t_max) = (self.kernel, ray.t_max);
         if self.world.meshes().len() == 1 {
-            return match self.aim.may_hold(ray) {
+            return match self.aim.may_contain(ray) {
                 true => kernel.run(ClosestInFront { tracer: self, front: 0, ray, t_max }),
                 false => kernel.run(ClosestInMesh { tracer: self, mesh: MeshId(0), ray, t_max }),
             };
         }
-        if self.aim.may_hold(ray) && self.aim.holds(ray) {
+        if self.aim.contains(ray) {
             return self.closest_of_fronts(ray);
         }
         self.closest_of_meshes(ray)

@@ -364,16 +364,8 @@ fn patch_boxes(
 
 /// The world-space box of a box in lattice units.
 fn world_box(surface: &Surface, world_from_object: DAffine3, b: Bounds) -> DBounds {
-    if b.is_empty() {
-        return DBounds::EMPTY;
-    }
-    let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
-    let corner = |k: u32| {
-        let pick = |axis: u32, a: f64, b: f64| if (k >> axis) & 1 == 0 { a } else { b };
-        let p = DVec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z));
-        world_from_object.transform_point3(surface.object_from_lattice(p))
-    };
-    (0..8).map(corner).collect()
+    let corners = DBounds { min: b.min.as_dvec3(), max: b.max.as_dvec3() }.corners();
+    corners.map(|p| world_from_object.transform_point3(surface.object_from_lattice(p))).collect()
 }
 
 /// The cache of a world's grids: one slot for each leaf of each mesh's tree.

@@ -15,8 +15,8 @@ use super::traverse::{TraversalStack, Walk};
 use super::{EMPTY, LANES, LEAF, LeafRef, LeafWalk, NodeBoxes, Refs, TopLevel};
 use crate::grid::LatticeRay;
 use crate::ids::PatchId;
-use crate::math::RayBounds;
 use crate::math::simd::{Kernel, place};
+use crate::math::{DBounds, RayBounds};
 use glam::{DVec3, Vec3};
 
 /// Leaves and nodes of a front, at most.
@@ -67,6 +67,7 @@ struct Item {
     /// Where the bundle enters it, at least.
     enter: f32,
     reference: u32,
+    /// That of a leaf.
     slot: u32,
     planes: [f32; 6],
 }
@@ -81,7 +82,7 @@ impl Default for Front {
 impl Front {
     /// Whether a ray, in lanes 0 to 2 of origin and direction, is of the bundle.
     #[inline(always)]
-    pub fn holds<K: Kernel>(&self, k: K, [origin, direction]: [K::D; 2]) -> bool {
+    pub fn contains<K: Kernel>(&self, k: K, [origin, direction]: [K::D; 2]) -> bool {
         let [o, p, d, e] = &self.bounds;
         let of_origin = k.lt4(k.load4(o), origin) & k.lt4(origin, k.load4(p));
         let of_direction = k.lt4(k.load4(d), direction) & k.lt4(direction, k.load4(e));
@@ -96,9 +97,9 @@ impl Front {
 
     /// For another bundle.
     fn set_bounds(&mut self, bundle: &RayBounds) {
-        let outwards = |[low, high]: [DVec3; 2]| {
-            let more = ROUNDED * low.abs().max(high.abs());
-            [low - more, high + more].map(|v| [v.x, v.y, v.z, 0.0])
+        let outwards = |of: DBounds| {
+            let more = ROUNDED * of.min.abs().max(of.max.abs());
+            [of.min - more, of.max + more].map(|v| [v.x, v.y, v.z, 0.0])
         };
         let ([o, p], [d, e]) = (outwards(bundle.origin), outwards(bundle.direction));
         self.bounds = [o, p, d, e];
@@ -192,10 +193,10 @@ struct Intervals {
 impl Intervals {
     /// `None` if the origins are too far away for the margin.
     fn new(bundle: &RayBounds) -> Option<Self> {
-        let [low, high] = bundle.origin;
+        let DBounds { min: low, max: high } = bundle.origin;
         // Not `>`, which is false for NaN.
         let is_near = low.abs().max(high.abs()).cmple(DVec3::splat(FARTHEST)).all();
-        let of_axis = |axis: usize| inverses(bundle.direction.map(|d| d[axis]));
+        let of_axis = |axis: usize| inverses([bundle.direction.min[axis], bundle.direction.max[axis]]);
         let [x, y, z] = [0, 1, 2].map(of_axis);
         let inverse = [Vec3::new(x[0], y[0], z[0]), Vec3::new(x[1], y[1], z[1])];
         is_near.then(|| Self { origin: [low.as_vec3() - MARGIN, high.as_vec3() + MARGIN], inverse })

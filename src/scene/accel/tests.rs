@@ -3,7 +3,7 @@
 use super::*;
 use crate::grid::{LatticeRay, TriangleId};
 use crate::math::simd::{Kernel, Portable, Task, run};
-use crate::math::{Bounds, Ray, RayBounds};
+use crate::math::{Bounds, DBounds, Ray, RayBounds};
 use glam::{DVec3, Vec3};
 
 /// Numbers in [0, 1) that are the same in every run.
@@ -196,8 +196,8 @@ fn from_its_front_a_ray_of_a_bundle_visits_what_it_visits_from_the_root() {
             let corners = [(eye, axis), (eye + around * o, axis + spread * d)].map(|(o, d)| Ray::new(o, d));
             let bundle: RayBounds = corners.into_iter().collect();
             for k in 0..4 {
-                let blend = |[low, high]: [DVec3; 2]| {
-                    low + DVec3::from_array([0, 1, 2].map(|a| random(9 * i + 3 * k + a))) * (high - low)
+                let blend = |b: DBounds| {
+                    b.min + DVec3::from_array([0, 1, 2].map(|a| random(9 * i + 3 * k + a))) * (b.max - b.min)
                 };
                 let ray = ray(blend(bundle.origin), blend(bundle.direction));
                 for visits in [run(FromFront(&tree, &bundle, &ray)), FromFront(&tree, &bundle, &ray).run(Portable)] {
@@ -209,6 +209,60 @@ fn from_its_front_a_ray_of_a_bundle_visits_what_it_visits_from_the_root() {
         }
     }
     assert!(n_leaves > 10_000, "only {n_leaves} leaves were visited");
+}
+
+/// The nearest of the made-up hits of a ray, and how many leaves it visits until it is found.
+struct NearestFromFront<'a>(&'a TopLevel, &'a RayBounds, &'a LatticeRay, &'a dyn Fn(PatchId) -> Option<f32>);
+
+impl Task for NearestFromFront<'_> {
+    type Output = (f32, usize);
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> Self::Output {
+        let Self(tree, bundle, ray, hit_of) = self;
+        let (mut front, mut stack) = (Front::default(), TraversalStack::default());
+        assert!(tree.find_front(kernel, bundle, &mut front));
+        if front.is_empty() {
+            return (f32::INFINITY, 0);
+        }
+        let mut walk = tree.walk_front(kernel, &front, ray, &mut stack);
+        let (mut nearest, mut n_visits) = (f32::INFINITY, 0);
+        while let Some(leaf) = walk.nearest(nearest, |_| ()) {
+            nearest = hit_of(leaf.patch).map_or(nearest, |t| nearest.min(t));
+            n_visits += 1;
+        }
+        (nearest, n_visits)
+    }
+}
+
+#[test]
+fn what_lies_beyond_a_hit_is_left_out_of_a_front_and_nothing_before_it() {
+    const N: u32 = 2000;
+    let boxes = scattered(u64::from(N), 3e6);
+    let tree = TopLevel::build(&boxes, 2);
+    let (mut n_visits, mut n_met) = (0, 0);
+    for i in 0..200 {
+        // Directions of any length: they count t in their own units.
+        let (eye, forward) = (random_point(i, 8e6), random_point(i + 300, 10f64.powi(i as i32 % 5 - 2)));
+        let corners = [forward, forward + 1e-2 * forward.length() * random_point(i + 600, 1.0)];
+        let bundle: RayBounds = corners.into_iter().map(|direction| Ray::new(eye, direction)).collect();
+        let ray = ray(eye, 0.5 * (corners[0] + corners[1]));
+        let direction = DVec3::from_array(std::array::from_fn(|k| 1.0 / f64::from(ray.inv[k])));
+        let hit_of = |patch: PatchId| {
+            // Somewhere behind the front of every third box.
+            let t = entry(&boxes[patch.idx()], ray.origin(), direction).filter(|_| patch.0.is_multiple_of(3));
+            t.map(|t| (t + 2e6 * random(u64::from(patch.0))) as f32)
+        };
+        let wanted = (0..N).filter_map(|patch| hit_of(PatchId(patch))).fold(f32::INFINITY, f32::min);
+        for (nearest, n) in [
+            run(NearestFromFront(&tree, &bundle, &ray, &hit_of)),
+            NearestFromFront(&tree, &bundle, &ray, &hit_of).run(Portable),
+        ] {
+            assert_eq!(nearest, wanted, "bundle {i}");
+            n_visits += n;
+        }
+        n_met += 2 * run(Visits(&tree, &ray)).len();
+    }
+    assert!(2 * n_visits < n_met, "hits hide little: {n_visits} of {n_met}");
 }
 
 #[test]
