@@ -11,11 +11,11 @@
 //! random numbers are hashes of (pixel, 2 sample) and (pixel, 2 sample + 1). Rays and results are f32, built before any
 //! clock starts. With `batch` above 0, secondary rays are handed over in batches of so many, for the tracer to put into
 //! an order of its own: no part of the recipe. Primary rays are traced one by one as the recipe has it, but the tracer is told the bounds of a task's rays before the first, within the time that counts,
-//! as a renderer would that knows its tile. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of
+//! as a renderer would that knows its tile; with each secondary ray it is told above which triangle that starts, as renderers know as well, unless `tells_start` is off. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of
 //! the threads (`cpu`).
 
 use crate::io::process::thread_cpu;
-use crate::math::{Hit, Intersect, Ray};
+use crate::math::{Hit, Intersect, PrimitiveRef, Ray};
 use crate::render::sampler::hash2;
 use crate::scene::camera::Camera;
 use glam::{DVec2, Vec3};
@@ -40,6 +40,20 @@ impl BenchRay {
     #[inline]
     fn ray(&self) -> Ray {
         Ray::new(self.origin.as_dvec3(), self.direction.as_dvec3())
+    }
+}
+
+/// A ray that starts above a triangle.
+#[derive(Clone, Copy, Debug)]
+struct SecondaryRay {
+    ray: BenchRay,
+    from: Option<PrimitiveRef>,
+}
+
+impl SecondaryRay {
+    #[inline]
+    fn ray(&self) -> Ray {
+        Ray { from: self.from, is_above: self.from.is_some(), ..self.ray.ray() }
     }
 }
 
@@ -94,6 +108,8 @@ pub struct BenchSettings {
     pub ao: u32,
     /// Secondary rays handed over at a time; 0: one by one, as the recipe has it.
     pub batch: usize,
+    /// Whether the tracer is told above which triangle each secondary ray starts.
+    pub tells_start: bool,
     /// Passes of each measurement.
     pub repeat: usize,
     /// Which passes to run besides the first primary one: primary, AO, diffuse.
@@ -192,7 +208,10 @@ impl Bench {
     ) -> BenchResult {
         let mut result = BenchResult::default();
         self.run_primary(&make_tracer, &bench_hit, &mut result);
-        let (ao, mut diffuse) = self.secondary_rays();
+        if !self.settings.passes[1] && !self.settings.passes[2] {
+            return result;
+        }
+        let (ao, mut diffuse) = self.secondary_rays(&mut make_tracer());
         if self.settings.passes[1] {
             self.run_ao(&make_tracer, &ao, &mut result);
         }
@@ -237,7 +256,12 @@ impl Bench {
         result.mean_t = if n > 0 { sum / n as f64 } else { 0.0 };
     }
 
-    fn run_ao<T: Intersect>(&self, make_tracer: &(impl Fn() -> T + Sync), rays: &[BenchRay], result: &mut BenchResult) {
+    fn run_ao<T: Intersect>(
+        &self,
+        make_tracer: &(impl Fn() -> T + Sync),
+        rays: &[SecondaryRay],
+        result: &mut BenchResult,
+    ) {
         let mut occluded = vec![false; rays.len()];
         let batch = self.in_batches(rays);
         let mut chunks: Vec<&mut [bool]> = occluded.chunks_mut(self.settings.task_size()).collect();
@@ -260,7 +284,7 @@ impl Bench {
     fn run_diffuse<T: Intersect>(
         &self,
         make_tracer: &(impl Fn() -> T + Sync),
-        rays: &[BenchRay],
+        rays: &[SecondaryRay],
         is_hit: &mut [bool],
     ) -> Rates {
         if let Some(rays) = self.in_batches(rays) {
@@ -295,12 +319,12 @@ impl Bench {
     }
 
     /// The rays as the tracer takes them in batches, if it is to get them so.
-    fn in_batches(&self, rays: &[BenchRay]) -> Option<Vec<Ray>> {
-        (self.settings.batch > 0).then(|| rays.iter().map(BenchRay::ray).collect())
+    fn in_batches(&self, rays: &[SecondaryRay]) -> Option<Vec<Ray>> {
+        (self.settings.batch > 0).then(|| rays.iter().map(SecondaryRay::ray).collect())
     }
 
-    /// AO and diffuse rays from the primary hits.
-    fn secondary_rays(&self) -> (Vec<BenchRay>, Vec<BenchRay>) {
+    /// AO and diffuse rays from the primary hits, whose triangles are asked for once more: so no pass has to write them down.
+    fn secondary_rays(&self, tracer: &mut impl Intersect) -> (Vec<SecondaryRay>, Vec<SecondaryRay>) {
         let n_ao = if self.settings.passes[1] { self.settings.ao } else { 0 };
         let offset = (1e-4 * self.settings.diagonal) as f32;
         let (mut ao, mut diffuse) = (Vec::new(), Vec::new());
@@ -312,9 +336,10 @@ impl Bench {
             let sign = if hit.normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
             let normal = hit.normal * (sign / length);
             let origin = ray.origin + hit.t * ray.direction + offset * normal;
+            let from = self.settings.tells_start.then(|| tracer.closest(&ray.ray())).flatten().map(|hit| hit.primitive);
             let along = |sample: u32| {
                 let direction = cosine_direction(normal, uniform(pixel, 2 * sample), uniform(pixel, 2 * sample + 1));
-                BenchRay { origin, direction }
+                SecondaryRay { ray: BenchRay { origin, direction }, from }
             };
             ao.extend((0..n_ao).map(along));
             diffuse.push(along(self.settings.ao));
@@ -463,8 +488,16 @@ mod tests {
 
     #[test]
     fn tiles_cover_every_pixel_once() {
-        let settings =
-            BenchSettings { size: [37, 21], threads: 1, ao: 1, batch: 0, repeat: 1, passes: [true; 3], diagonal: 1.0 };
+        let settings = BenchSettings {
+            size: [37, 21],
+            threads: 1,
+            ao: 1,
+            batch: 0,
+            tells_start: true,
+            repeat: 1,
+            passes: [true; 3],
+            diagonal: 1.0,
+        };
         let description =
             crate::scene::description::CameraDescription { eye: DVec3::ZERO, at: DVec3::X, up: DVec3::Y, fov: 35.0 };
         let mut pixels = Bench::new(&Camera::new(&description), settings).pixel;

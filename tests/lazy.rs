@@ -9,6 +9,7 @@ use lazytess::cache::CacheConfig;
 use lazytess::ids::MeshId;
 use lazytess::math::{DBounds, Hit, Intersect, Ray};
 use lazytess::mesh::{ControlMesh, shapes};
+use lazytess::render::Tracer;
 use lazytess::scene::intersect::Intersector;
 use lazytess::scene::rate::DicingRate;
 use lazytess::scene::world::{GridCache, World, WorldMesh};
@@ -126,6 +127,54 @@ fn taking_aim_changes_no_answer() {
         }
     }
     assert!(n_hits > 1000, "only {n_hits} rays hit anything");
+}
+
+#[test]
+fn rays_said_to_start_above_a_surface_answer_as_if_they_were_not() {
+    let mut random = Random(0xabc_0de);
+    let (mut n_spared, mut n_asked) = (0, 0);
+    for (name, mesh) in shapes::all() {
+        let turned = DAffine3::from_rotation_y(0.4);
+        let mirrored = turned * DAffine3::from_scale(DVec3::new(-1e3, 1e3, 1e3));
+        let stretched = turned * DAffine3::from_scale(DVec3::new(1.0, 0.1, 3.0));
+        for (rate, place) in [(3, turned), (8, mirrored), (13, DAffine3::IDENTITY), (13, stretched), (32, turned)] {
+            let world = world_of(vec![(mesh.clone(), place, DicingRate::Fixed(rate))]);
+            let caches = [0, 16 << 20, 16 << 20].map(|bytes| cache_of(&world, CacheConfig::with_bytes(bytes)));
+            {
+                let [mut small, mut told, mut plain] = caches.each_ref().map(|cache| Intersector::new(&world, cache));
+                let bounds = world.meshes()[0].bounds_in_world();
+                let rays: Vec<Ray> = (0..40).map(|_| random.ray(bounds)).collect();
+                for ray in rays.iter().chain(&rays).chain(&rays) {
+                    for ray in leaving(ray, &mut plain, &mut random) {
+                        let blind = Ray { is_above: false, ..ray };
+                        let wanted = plain.closest(&blind);
+                        for tracer in [&mut told, &mut small] {
+                            let hit = tracer.closest(&ray);
+                            assert_eq!(format!("{hit:?}"), format!("{wanted:?}"), "{name} at {rate}, {ray:?}");
+                            assert_eq!(tracer.occluded(&ray), wanted.is_some(), "{name} at {rate}, {ray:?}");
+                        }
+                        plain.occluded(&blind);
+                    }
+                }
+            }
+            let [small, told, plain] = caches.map(|cache| cache.segments().statistics().lookups);
+            assert_eq!(small, told, "{name} at {rate}: what is looked up depends on what is there");
+            (n_spared, n_asked) = (n_spared + plain - told, n_asked + plain);
+        }
+    }
+    assert!(4 * n_spared > n_asked, "only {n_spared} of {n_asked} blocks were not looked at");
+}
+
+/// Rays that leave the surface where one hits, to both sides, as a renderer makes them.
+fn leaving(ray: &Ray, tracer: &mut Intersector<'_>, random: &mut Random) -> Vec<Ray> {
+    let Some(hit) = tracer.closest(ray) else { return Vec::new() };
+    let at = tracer.surface_point(ray, &hit);
+    let ray = |direction: DVec3| {
+        let side = at.clearance * direction.dot(at.geometric_normal).signum();
+        let origin = at.position + side * at.geometric_normal;
+        Ray { from: Some(hit.primitive), is_above: true, ..Ray::new(origin, direction) }
+    };
+    (0..6).map(|k| ray(random.in_cube() + f64::from(k % 3) * at.geometric_normal)).collect()
 }
 
 /// A ray that goes on from where one hits.

@@ -232,6 +232,19 @@ impl<'p> Visit<'p> {
         Some(if is_old { self.reinsert(word, seen) } else { unsafe { self.block(seen) } })
     }
 
+    /// The block of a slot if it is there or this thread has built it for itself, for who can do without: it does not count as looked up.
+    ///
+    /// # Panics
+    /// If the slot belongs to another cache.
+    pub fn peek<'v>(&'v self, slot: Slot<'v>) -> Option<Block<'v>> {
+        let seen = slot.word_in(self.tag()).load(Ordering::Acquire);
+        if self.can_read(seen) {
+            // SAFETY: just seen with `Acquire` and readable.
+            return Some(unsafe { self.block(seen) });
+        }
+        self.private_block_of_slot(slot)
+    }
+
     /// Hints that the block of a slot will be asked for soon.
     #[inline(always)]
     pub fn prefetch(&self, slot: Slot<'_>) {

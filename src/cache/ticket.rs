@@ -47,11 +47,9 @@ impl<'p> Visit<'p> {
     #[cold]
     pub fn claim<'v>(&'v self, slot: Slot<'v>) -> Claim<'v> {
         let word = slot.word_in(self.tag());
-        if self.pin.knows_all_tables()
-            && let Some((bytes, word_lines)) = self.pin.scratch.recall(slot.key())
-        {
+        if let Some(block) = self.private_block_of_slot(slot) {
             count(&self.pin.counters.private_hits);
-            return Claim::Ready(self.private_block_of(bytes, word_lines));
+            return Claim::Ready(block);
         }
         let mut seen = word.load(Ordering::Acquire);
         if is_free(seen) && !self.can_read(seen) && !self.is_outsider() {
@@ -101,6 +99,15 @@ impl<'p> Visit<'p> {
             self.pin.scratch.remember(key, bytes, layout.word_lines());
         }
         self.private_block_of(bytes, layout.word_lines())
+    }
+
+    /// The block that this thread has built for itself, if it still remembers.
+    pub(super) fn private_block_of_slot<'v>(&'v self, slot: Slot<'v>) -> Option<Block<'v>> {
+        if !self.pin.knows_all_tables() {
+            return None;
+        }
+        let (bytes, word_lines) = self.pin.scratch.recall(slot.key())?;
+        Some(self.private_block_of(bytes, word_lines))
     }
 
     fn private_block_of<'v>(&'v self, bytes: &'v [u8], word_lines: usize) -> Block<'v> {

@@ -52,6 +52,9 @@ pub struct BenchArgs {
     /// Hand secondary rays over N at a time, for the tracer to put into an order of its own; 0: one by one, as given
     #[arg(long, default_value_t = 0, value_name = "N")]
     batch: usize,
+    /// Do not tell on which triangle secondary rays start, so that they are tested against all of the patch that they leave
+    #[arg(long)]
+    no_start: bool,
     /// Passes of each measurement
     #[arg(long, default_value_t = 5, value_name = "K", value_parser = count)]
     repeat: u32,
@@ -94,6 +97,8 @@ struct Report {
     eye: [f64; 3],
     /// Secondary rays handed over at a time; 0: one by one.
     batch: usize,
+    /// Whether secondary rays came with the triangle that they start above.
+    tells_start: bool,
     #[serde(flatten)]
     result: BenchResult,
     rss_end_kb: i64,
@@ -115,6 +120,7 @@ impl BenchArgs {
             threads,
             ao: self.ao,
             batch: self.batch,
+            tells_start: !self.no_start,
             repeat: self.repeat as usize,
             passes: [RayKind::Primary, RayKind::Ao, RayKind::Diffuse].map(|k| self.rays.contains(&k)),
             diagonal: bounds.diagonal(),
@@ -148,6 +154,7 @@ impl BenchArgs {
             height: self.size[1],
             eye: description.eye.to_array(),
             batch: self.batch,
+            tells_start: !self.no_start,
             result,
             rss_end_kb: (resident_bytes().unwrap_or(0) as i64 - rss_before as i64) / 1024,
             hwm_kb: peak_resident_bytes().unwrap_or(0) / 1024,

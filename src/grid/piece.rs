@@ -13,6 +13,12 @@ const TAIL_BYTES: usize = 8;
 /// Blocks begin and end on cache lines.
 const LINE_BYTES: usize = 64;
 
+/// Bytes of the largest piece.
+pub const MOST_PIECE_BYTES: usize = {
+    let columns = MAX_CELLS + 1;
+    (HEAD_BYTES + 3 * columns * columns * VertexFormat::Four as usize + TAIL_BYTES).next_multiple_of(LINE_BYTES)
+};
+
 /// How a vertex coordinate is stored: an unsigned offset from the piece's lowest corner.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
@@ -335,6 +341,12 @@ impl<'b> PieceView<'b> {
     #[inline(always)]
     pub(super) fn row_start(&self, j: usize, axis: usize) -> usize {
         HEAD_BYTES + usize::from(self.head.format) * self.columns() * (3 * j + axis)
+    }
+
+    /// Rows of vertices.
+    #[inline(always)]
+    pub(super) fn rows(&self) -> usize {
+        2 * usize::from(self.head.lanes[1]) + 1
     }
 
     /// Vertices of a row.

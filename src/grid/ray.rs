@@ -1,6 +1,7 @@
 //! A ray made ready for boxes and triangles of the lattice.
 
 use super::TriangleId;
+use crate::ids::PatchId;
 use crate::math::simd::{Kernel, Portable};
 use glam::DVec3;
 
@@ -243,6 +244,23 @@ impl LatticeRay {
     pub fn not_below(&self, t: f32) -> f32 {
         let inner = f64::from(t) / self.t_unit - self.t_start;
         (inner + inner.abs() * 1e-6 + self.t_start.abs() * 1e-12) as f32
+    }
+
+    /// True for an eighth of all rays, without further meaning.
+    pub fn is_one_in_eight(&self) -> bool {
+        self.shear[0].to_bits().is_multiple_of(8)
+    }
+
+    /// The cell of the triangle that is not hit.
+    #[inline(always)]
+    pub fn start_cell(&self) -> [u32; 2] {
+        [self.skip.i(), self.skip.j()]
+    }
+
+    /// Whether the triangle that is not hit is one of this patch.
+    #[inline(always)]
+    pub fn starts_on(&self, patch: PatchId) -> bool {
+        self.skip.patch() == patch
     }
 
     /// Where the ray ends, in lattice space's units of t; negative for a ray that hits nothing.

@@ -3,7 +3,9 @@
 use super::costs::BuildCosts;
 use super::world::{GridCache, WorldMesh};
 use crate::cache::{Block, BlockLayout, Claim, Recorder, Slot, SlotId, Visit};
-use crate::grid::{CellRect, MAX_CELLS, NODE_BYTES, NodeView, PieceLayout, encode_node, is_node};
+use crate::grid::{
+    CellRect, MAX_CELLS, MOST_PIECE_BYTES, NODE_BYTES, NodeView, PieceLayout, PieceView, encode_node, is_node,
+};
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Bounds, LatticeGrid};
 use crate::subdiv::{Dicer, PatchRates};
@@ -17,11 +19,25 @@ const CHILD_BOX_DEPTH: u32 = 3;
 /// Patches whose rates a builder remembers.
 const N_RATES: usize = 16;
 
+/// Room for the pieces of a node.
+#[derive(Default)]
+pub(super) struct PieceRoom(Vec<u64>);
+
+impl PieceRoom {
+    /// Places for one piece each.
+    pub fn places(&mut self) -> impl Iterator<Item = &mut [u8]> {
+        self.0.resize((NODE_SIDE * NODE_SIDE) as usize * MOST_PIECE_BYTES / size_of::<u64>(), 0);
+        bytemuck::cast_slice_mut(&mut self.0).chunks_exact_mut(MOST_PIECE_BYTES)
+    }
+}
+
 /// What building a block needs.
 #[derive(Default)]
 pub(super) struct Builder<'w> {
     dicer: Dicer,
     vertices: LatticeGrid,
+    /// Room for pieces that are looked at once.
+    pub pieces: PieceRoom,
     boxes: Vec<Bounds>,
     pub n_built: u64,
     pub n_pieces: u64,
@@ -49,6 +65,15 @@ pub(super) fn child_side(cells: CellRect) -> u32 {
         side *= NODE_SIDE;
     }
     side
+}
+
+/// Whether so many cells are one piece; else there is a node over them.
+pub(super) fn is_piece(cells: CellRect) -> bool {
+    cells.size().iter().all(|&n| n <= MAX_CELLS)
+}
+
+fn all_cells(rates: &PatchRates) -> CellRect {
+    CellRect { i0: 0, j0: 0, i1: rates.n_u as u16, j1: rates.n_v as u16 }
 }
 
 /// Cells of child (a, b) of a node.
@@ -85,13 +110,11 @@ impl<'w> Builder<'w> {
         self.n_built += 1;
         self.costs.add(of.id, of.patch, 1);
         let rates = self.rates(of);
-        let cells = cells.unwrap_or(CellRect { i0: 0, j0: 0, i1: rates.n_u as u16, j1: rates.n_v as u16 });
-        let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
-        if cells.size().iter().all(|&n| n <= MAX_CELLS) {
-            self.dicer.dice(of.mesh.surface(), of.patch, &rates, i, j, &mut self.vertices);
+        let cells = cells.unwrap_or_else(|| all_cells(&rates));
+        if is_piece(cells) {
+            let layout = self.lay_out(of, &rates, cells);
             self.n_pieces += 1;
             self.n_triangles += 2 * cells.size().iter().product::<usize>() as u64;
-            let layout = PieceLayout::new(&self.vertices, cells, [rates.n_u as u16, rates.n_v as u16]);
             let vertices = &self.vertices;
             return ticket
                 .publish(BlockLayout { bytes: layout.bytes(), children: 0 }, |out| layout.encode(vertices, out));
@@ -102,6 +125,27 @@ impl<'w> Builder<'w> {
         ticket.publish(BlockLayout { bytes: NODE_BYTES, children: n_slots }, |out| {
             encode_node(cells, children, boxes, out);
         })
+    }
+
+    /// Puts the vertices of a piece into `self.vertices`.
+    fn lay_out(&mut self, of: PatchContext<'_>, rates: &PatchRates, cells: CellRect) -> PieceLayout {
+        let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
+        self.dicer.dice(of.mesh.surface(), of.patch, rates, i, j, &mut self.vertices);
+        PieceLayout::new(&self.vertices, cells, [rates.n_u as u16, rates.n_v as u16])
+    }
+
+    /// Makes a piece without the cache, in `room`: as long as the largest piece, and aligned to 4 bytes.
+    pub fn make_piece<'r>(&mut self, of: PatchContext<'_>, cells: CellRect, room: &'r mut [u8]) -> PieceView<'r> {
+        let rates = self.rates(of);
+        let layout = self.lay_out(of, &rates, cells);
+        let room = &mut room[..layout.bytes()];
+        layout.encode(&self.vertices, room);
+        PieceView::new(room)
+    }
+
+    /// The cells of a patch.
+    pub fn cells_of(&mut self, of: PatchContext<'_>) -> CellRect {
+        all_cells(&self.rates(of))
     }
 
     /// How finely a patch is diced: the same for its node and all its pieces.

@@ -4,13 +4,14 @@
 //! 8 x 8 cells, else a node whose children are nodes or pieces in their turn. A block that is missing is built on the
 //! spot, so nothing is tessellated but what a ray reaches.
 //!
-//! `entrance.rs` takes a ray into a mesh's lattice, `aim.rs` and `accel` to its patches, `patch_walk.rs` through a patch; `builder.rs`
-//! builds what is missing.
+//! `entrance.rs` takes a ray into a mesh's lattice, `aim.rs` and `accel` to its patches, `departure.rs` past the one that it leaves,
+//! `patch_walk.rs` through a patch; `builder.rs` builds what is missing.
 
 use super::accel::{LeafWalk, TraversalStack};
 use super::aim::{Aim, TakeAim};
 use super::batch::{BatchOrder, MOST_RAYS};
 use super::builder::{Builder, PatchContext};
+use super::departure::Leaving;
 use super::patch_walk::{ClosestInPatch, InPatch, OccludedInPatch};
 use super::world::{GridCache, World, WorldMesh};
 use crate::cache::{Pin, SlotId, TraceLog, Visit};
@@ -94,9 +95,10 @@ impl Task for ClosestInMesh<'_, '_> {
         if !mesh.entrance().is_in_reach(kernel, entering) {
             return None;
         }
+        let leaving = Leaving::of(ray, id, mesh, cache.departures());
         let ray = &lattice_ray(kernel, entering, id, ray, t_max);
         let walk = mesh.top().walk(kernel, ray, &mut stacks.mesh);
-        Leaves { id, mesh, cache, visit: &pin.visit(), builder, ray }.closest(kernel, walk)
+        Leaves { id, mesh, cache, visit: &pin.visit(), builder, leaving, ray }.closest(kernel, walk)
     }
 }
 
@@ -126,7 +128,7 @@ impl Task for ClosestInFront<'_, '_> {
         }
         let ray = &lattice_ray(kernel, entering, id, ray, t_max);
         let walk = mesh.top().walk_front(kernel, front, ray, &mut stacks.mesh);
-        Leaves { id, mesh, cache, visit: &pin.visit(), builder, ray }.closest(kernel, walk)
+        Leaves { id, mesh, cache, visit: &pin.visit(), builder, leaving: Leaving::NOTHING, ray }.closest(kernel, walk)
     }
 }
 
@@ -137,6 +139,7 @@ struct Leaves<'a, 'v, 'p, 'w> {
     cache: &'w GridCache,
     visit: &'v Visit<'p>,
     builder: &'a mut Builder<'w>,
+    leaving: Leaving<'w>,
     ray: &'a LatticeRay,
 }
 
@@ -144,19 +147,25 @@ impl Leaves<'_, '_, '_, '_> {
     /// The nearest hit on the way.
     #[inline(always)]
     fn closest<K: Kernel>(self, kernel: K, mut walk: impl LeafWalk) -> Option<Hit> {
-        let Self { id, mesh, cache, visit, builder, ray } = self;
+        let Self { id, mesh, cache, visit, builder, leaving, ray } = self;
         let hit = &mut LatticeHit::none(ray.t_max());
         let table = cache.table(id);
         while let Some(leaf) = walk.nearest(hit.t, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
-            if let Some(block) = visit.get(visit.root(table, SlotId(leaf.slot))) {
+            let root = visit.root(table, SlotId(leaf.slot));
+            let Some(left_out) = leaving.left_out(ray, of, leaf.slot, builder, visit, root) else { continue };
+            if let Some(block) = visit.get(root) {
                 builder.note_root(of, leaf.slot, block);
-                ClosestInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray }, hit }.run(kernel);
+                ClosestInPatch { builder, at: InPatch { visit, block, left_out, depth: 0, of, ray }, hit }.run(kernel);
             } else {
                 // Apart, so that a block that is there stays in registers.
                 let block = builder.build_root(visit, of, cache, leaf.slot);
                 builder.note_root(of, leaf.slot, block);
-                kernel.enter(ClosestInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray }, hit });
+                kernel.enter(ClosestInPatch {
+                    builder,
+                    at: InPatch { visit, block, left_out, depth: 0, of, ray },
+                    hit,
+                });
             }
         }
         hit.is_some().then(|| hit_of(mesh, id, ray.caller_t(hit.t), hit))
@@ -181,19 +190,22 @@ impl Task for OccludedInMesh<'_, '_> {
         if !mesh.entrance().is_in_reach(kernel, entering) {
             return false;
         }
+        let leaving = Leaving::of(ray, id, mesh, cache.departures());
         let ray = &lattice_ray(kernel, entering, id, ray, ray.t_max);
         let table = cache.table(id);
         let visit = &pin.visit();
         let mut walk = mesh.top().walk_any(kernel, ray, &mut stacks.mesh);
         while let Some(leaf) = walk.next(|slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
-            let is_hit = if let Some(block) = visit.get(visit.root(table, SlotId(leaf.slot))) {
+            let root = visit.root(table, SlotId(leaf.slot));
+            let Some(left_out) = leaving.left_out(ray, of, leaf.slot, builder, visit, root) else { continue };
+            let is_hit = if let Some(block) = visit.get(root) {
                 builder.note_root(of, leaf.slot, block);
-                OccludedInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray } }.run(kernel)
+                OccludedInPatch { builder, at: InPatch { visit, block, left_out, depth: 0, of, ray } }.run(kernel)
             } else {
                 let block = builder.build_root(visit, of, cache, leaf.slot);
                 builder.note_root(of, leaf.slot, block);
-                kernel.enter(OccludedInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray } })
+                kernel.enter(OccludedInPatch { builder, at: InPatch { visit, block, left_out, depth: 0, of, ray } })
             };
             if is_hit {
                 return true;

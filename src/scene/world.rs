@@ -2,6 +2,7 @@
 
 use super::accel::{BUILD_BYTES_PER_PATCH, TopLevel};
 use super::costs::BuildCosts;
+use super::departure::Departures;
 use super::description::MeshDescription;
 use super::entrance::Entrance;
 use super::rate::DicingRate;
@@ -73,6 +74,7 @@ pub struct WorldMesh {
     bounds_in_world: DBounds,
     /// Into the top level's box, widened by more than a ray's rounding.
     entrance: Entrance,
+    keeps_angles: bool,
 }
 
 /// What the full tessellation would take.
@@ -161,6 +163,13 @@ fn scene_box(scene_from_world: DAffine3, b: DBounds) -> Bounds {
     Bounds { min: (min - 1.0).floor().as_vec3(), max: (max + 1.0).ceil().as_vec3() }
 }
 
+/// Whether the map is one scale for all directions and a turn, mirrored or not, but for a hundredth.
+fn keeps_angles(map: &DMat3) -> bool {
+    let gram = map.transpose() * *map;
+    let scale = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;
+    (gram - DMat3::from_diagonal(DVec3::splat(scale))).abs_diff_eq(DMat3::ZERO, 0.01 * scale)
+}
+
 impl WorldMesh {
     /// Prepares a mesh for tracing on `n_threads` threads: plans, boxes and tree, but no grid.
     pub fn new(mesh: ControlMesh, world_from_object: DAffine3, rate: DicingRate, n_threads: usize) -> Result<Self> {
@@ -205,6 +214,7 @@ impl WorldMesh {
             rate,
             bounds_in_world,
             entrance: Entrance::new(&lattice_from_world, reach),
+            keeps_angles: keeps_angles(&lattice_from_world.matrix3),
             surface,
         })
     }
@@ -219,6 +229,12 @@ impl WorldMesh {
     ) -> Result<Self> {
         Self::prepare(mesh, description.world_from_object, rate, n_threads, progress)
             .map_err(|e| Error::input(format!("{}: {e}", description.file.display())))
+    }
+
+    /// Whether the way from the world to the lattice turns right angles into right angles, but for a degree.
+    #[inline(always)]
+    pub(super) fn keeps_angles(&self) -> bool {
+        self.keeps_angles
     }
 
     /// The limit surface.
@@ -372,6 +388,7 @@ fn world_box(surface: &Surface, world_from_object: DAffine3, b: Bounds) -> DBoun
 pub struct GridCache {
     segments: SegmentCache,
     tables: Vec<SlotTable>,
+    departures: Departures,
     /// A bit per leaf slot, set when its patch is first asked for.
     touched: Vec<Box<[AtomicU64]>>,
     triangles_built: AtomicU64,
@@ -389,6 +406,7 @@ impl GridCache {
         let bits = |n: usize| (0..n.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
         Ok(Self {
             tables,
+            departures: Departures::new(n_slots()),
             touched: n_slots().map(bits).collect(),
             triangles_built: AtomicU64::new(0),
             pieces_built: AtomicU64::new(0),
@@ -416,6 +434,11 @@ impl GridCache {
     #[inline(always)]
     pub(super) fn table(&self, mesh: MeshId) -> &SlotTable {
         &self.tables[mesh.idx()]
+    }
+
+    #[inline(always)]
+    pub(super) fn departures(&self) -> &Departures {
+        &self.departures
     }
 
     /// Notes that a leaf's patch was asked for.
@@ -457,6 +480,11 @@ impl GridCache {
     /// What [`table_bytes`](Self::table_bytes) will be for this world.
     pub fn table_bytes_for(world: &World) -> usize {
         world.meshes.iter().map(|m| m.top.n_slots()).map(|n| 8 * n + 8 * n.div_ceil(64)).sum()
+    }
+
+    /// Bytes that tracing a world takes for what all threads remember, whatever the number of faces: 128 KiB at most.
+    pub fn working_bytes_for(world: &World) -> usize {
+        Departures::bytes_for(world.meshes.iter().map(|m| m.top.n_slots()).sum())
     }
 
     /// Bytes of slots and marks, the arena not included.

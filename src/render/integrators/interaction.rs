@@ -44,7 +44,7 @@ impl<'a> Interaction<'a> {
         let side =
             if direction.dot(self.geometric_normal) >= 0.0 { self.point.clearance } else { -self.point.clearance };
         let origin = self.point.position + side * self.geometric_normal;
-        Ray { from: Some(self.hit.primitive), ..Ray::new(origin, direction) }
+        Ray { from: Some(self.hit.primitive), is_above: true, ..Ray::new(origin, direction) }
     }
 
     /// Whether `direction` leaves to the side that the ray came from.
