@@ -143,8 +143,8 @@ fn rays_said_to_start_above_a_surface_answer_as_if_they_were_not() {
             {
                 let [mut small, mut told, mut plain] = caches.each_ref().map(|cache| Intersector::new(&world, cache));
                 let bounds = world.meshes()[0].bounds_in_world();
-                let rays: Vec<Ray> = (0..40).map(|_| random.ray(bounds)).collect();
-                for ray in rays.iter().chain(&rays).chain(&rays) {
+                let rays: Vec<Ray> = (0..30).map(|_| random.ray(bounds)).collect();
+                for ray in rays.iter().chain(&rays) {
                     for ray in leaving(ray, &mut plain, &mut random) {
                         let blind = Ray { is_above: false, ..ray };
                         let wanted = plain.closest(&blind);
@@ -162,7 +162,7 @@ fn rays_said_to_start_above_a_surface_answer_as_if_they_were_not() {
             (n_spared, n_asked) = (n_spared + plain - told, n_asked + plain);
         }
     }
-    assert!(4 * n_spared > n_asked, "only {n_spared} of {n_asked} blocks were not looked at");
+    assert!(8 * n_spared > n_asked, "only {n_spared} of {n_asked} blocks were not looked at");
 }
 
 /// Rays that leave the surface where one hits, to both sides, as a renderer makes them.
@@ -174,7 +174,7 @@ fn leaving(ray: &Ray, tracer: &mut Intersector<'_>, random: &mut Random) -> Vec<
         let origin = at.position + side * at.geometric_normal;
         Ray { from: Some(hit.primitive), is_above: true, ..Ray::new(origin, direction) }
     };
-    (0..6).map(|k| ray(random.in_cube() + f64::from(k % 3) * at.geometric_normal)).collect()
+    (0..20).map(|k| ray(random.in_cube() + f64::from(k % 3) * at.geometric_normal)).collect()
 }
 
 /// A ray that goes on from where one hits.

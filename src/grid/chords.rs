@@ -66,15 +66,16 @@ impl ChordCone {
     #[inline(always)]
     pub fn from_bits(bits: u32) -> Self {
         let [x, y, z, sine] = bits.to_le_bytes();
-        Self { axis: [x, y, z].map(u8::cast_signed), sine }
+        Self { axis: [x.cast_signed(), y.cast_signed(), z.cast_signed()], sine }
     }
 
     /// Whether the ray is so steep that it does not meet the surface that it starts on, or above as said.
     #[inline(always)]
     pub fn is_left_by(self, ray: &LatticeRay) -> bool {
-        let axis = self.axis.map(f32::from);
-        let [x, y, z] = ray.sides.axes.map(|k| axis[k as usize]);
-        let [shear_x, shear_y, _] = ray.shear;
+        // One by one: mapped arrays are calls.
+        let axis = [f32::from(self.axis[0]), f32::from(self.axis[1]), f32::from(self.axis[2])];
+        let ([kx, ky, kz], [shear_x, shear_y, _]) = (ray.sides.axes, ray.shear);
+        let (x, y, z) = (axis[kx as usize], axis[ky as usize], axis[kz as usize]);
         // Times the axis's length, in units of the direction's largest component.
         let height = shear_x * x + shear_y * y + z;
         let sine = f32::from(self.sine) * (1.0 / SINES);

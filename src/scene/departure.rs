@@ -1,14 +1,14 @@
 //! Rays that leave a patch so steeply that they do not meet it again: most secondary rays, whose own patch would
 //! otherwise be what they are tested against most, since they start in the midst of its boxes.
 //!
-//! How steep the surface of a block is, its [`ChordCone`], is found from its pieces when it is left for the second time. Those that are
+//! How steep the surface of a block is, its [`ChordCone`], is found from its pieces when enough rays have left it. Those that are
 //! not in the cache are diced for it and forgotten, so that what is tested does not depend on what the cache holds: a trace of look-ups can be replayed for
 //! any size. The cone is remembered as long as no other block takes its place. It decides only what is tested, never what is hit.
 
 use super::builder::{Builder, NODE_SIDE, PatchContext, child_cells, child_side, is_piece};
 use super::world::WorldMesh;
 use crate::cache::{Block, Slot, Visit};
-use crate::grid::{CellRect, ChordCone, LatticeRay, MAX_CELLS, NodeView, PieceView, is_node};
+use crate::grid::{CellRect, ChordCone, LatticeRay, MAX_CELLS, NodeView, PieceView};
 use crate::ids::MeshId;
 use crate::math::Ray;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -22,8 +22,11 @@ const ENTRIES_PER_SLOT: usize = 4;
 /// Children of a node.
 const MOST_CHILDREN: usize = (NODE_SIDE * NODE_SIDE) as usize;
 
-/// In place of a cone: the block was left once.
-const LEFT_ONCE: u32 = u32::MAX;
+/// These bits are set in what is in place of a cone that is not known yet: the number of rays that still have to leave the block. In no cone they are.
+const COUNT: u32 = 0xff << 24;
+
+/// Rays that leave a block, for each of its pieces, before its cone is found.
+const RAYS_PER_PIECE: u32 = 16;
 
 /// The cones of blocks that rays have left, for all threads.
 ///
@@ -95,27 +98,48 @@ impl Departures {
     fn left_out(&self, ray: &LatticeRay, leaf_slot: u32, left: &mut Left<'_, '_, '_, '_>) -> Option<u32> {
         let slot = self.first[left.of.id.idx()].wrapping_add(leaf_slot);
         let patch = Number(slot.wrapping_mul(MOST_CHILDREN as u32 + 1));
-        if self.is_left(ray, patch, left, None) {
-            return None;
+        match self.cone(ray, patch, left, None) {
+            Some(cone) if cone.is_left_by(ray) => None,
+            Some(_) => Some(self.left_child(ray, patch, left)),
+            None => Some(0),
         }
-        let cells = left.cells();
-        if is_piece(cells) {
-            return Some(0);
-        }
-        let child = child_of_start(cells, ray);
-        let is_left = self.is_left(ray, patch.child(child), left, Some(child));
-        Some(u32::from(is_left) << child)
     }
 
-    /// Whether the ray leaves a patch, or a child of its first block, for good.
+    /// The child of the patch's first block that the ray leaves for good, as a bit.
     #[inline(always)]
-    fn is_left(&self, ray: &LatticeRay, number: Number, left: &mut Left<'_, '_, '_, '_>, child: Option<u32>) -> bool {
-        let place = number.0 as usize & self.entries.len().wrapping_sub(1);
-        let Some(entry) = self.entries.get(place) else { return false };
+    fn left_child(&self, ray: &LatticeRay, patch: Number, left: &mut Left<'_, '_, '_, '_>) -> u32 {
+        let cells = left.cells();
+        if cells.i1.max(cells.j1) as usize <= MAX_CELLS {
+            return 0;
+        }
+        let child = child_of_start(cells, ray);
+        let is_left = self.cone(ray, patch.child(child), left, Some(child)).is_some_and(|cone| cone.is_left_by(ray));
+        u32::from(is_left) << child
+    }
+
+    /// The cone of a patch, or of a child of its first block, if it is known by now.
+    #[inline(always)]
+    fn cone(
+        &self,
+        ray: &LatticeRay,
+        number: Number,
+        left: &mut Left<'_, '_, '_, '_>,
+        child: Option<u32>,
+    ) -> Option<ChordCone> {
+        let entry = self.entries.get(number.0 as usize & self.entries.len().wrapping_sub(1))?;
         // `Relaxed`: the word is all there is to know.
-        match number.cone_in(entry.load(Ordering::Relaxed)) {
-            Some(cone) => cone.is_left_by(ray),
-            None => find(number, entry, ray, left, child).is_left_by(ray),
+        let word = entry.load(Ordering::Relaxed);
+        if !number.is_of(word) {
+            begin(number, entry, ray, left, child);
+            return None;
+        }
+        match word as u32 & !COUNT {
+            _ if word as u32 & COUNT != COUNT => Some(ChordCone::from_bits(word as u32)),
+            0 => Some(find(number, entry, left, child)),
+            _ => {
+                entry.store(word - 1, Ordering::Relaxed);
+                None
+            }
         }
     }
 }
@@ -124,11 +148,14 @@ fn entries_for(n_slots: usize) -> usize {
     n_slots.saturating_mul(ENTRIES_PER_SLOT).min(MOST_ENTRIES).next_power_of_two()
 }
 
-/// The child of a node over these cells in which the ray's triangle lies.
+/// The child of a patch's first node, which is over these cells, in which the ray's triangle lies.
 #[inline(always)]
 fn child_of_start(cells: CellRect, ray: &LatticeRay) -> u32 {
-    let ([i, j], side) = (ray.start_cell(), child_side(cells));
-    (j - u32::from(cells.j0)) / side * NODE_SIDE + (i - u32::from(cells.i0)) / side
+    const MOST_CELLS: u16 = (NODE_SIDE * MAX_CELLS as u32) as u16;
+    let [i, j] = ray.start_cell();
+    let side = if cells.i1.max(cells.j1) <= MOST_CELLS { MAX_CELLS as u32 } else { child_side(cells) };
+    let shift = side.trailing_zeros();
+    (j >> shift) * NODE_SIDE + (i >> shift)
 }
 
 impl Number {
@@ -143,32 +170,31 @@ impl Number {
         (u64::from(self.0) + 1) << 32 | u64::from(low)
     }
 
-    /// The cone in a word, if it is this block's.
+    /// Whether a word is this block's.
     #[inline(always)]
-    fn cone_in(self, word: u64) -> Option<ChordCone> {
-        let is_known = word >> 32 == u64::from(self.0) + 1 && word as u32 != LEFT_ONCE;
-        is_known.then(|| ChordCone::from_bits(word as u32))
+    fn is_of(self, word: u64) -> bool {
+        word >> 32 == u64::from(self.0) + 1
     }
 }
 
-/// Looks for the cone of a block that is left a second time. One that is left for the first time takes the entry of another one in an eighth
-/// of cases only: where there are more blocks than entries, cones would be found all the time, and forgotten.
+/// Begins to count the rays that leave a block. It takes the entry of
+/// another one in an eighth of cases only: where there are more blocks than entries, none would keep its own.
 #[cold]
 #[inline(never)]
-fn find(
-    number: Number,
-    entry: &AtomicU64,
-    ray: &LatticeRay,
-    left: &mut Left<'_, '_, '_, '_>,
-    child: Option<u32>,
-) -> ChordCone {
-    let (known, left_once) = (entry.load(Ordering::Relaxed), number.word(LEFT_ONCE));
-    if known != left_once {
-        if known == 0 || ray.is_one_in_eight() {
-            entry.store(left_once, Ordering::Relaxed);
-        }
-        return ChordCone::NONE;
+fn begin(number: Number, entry: &AtomicU64, ray: &LatticeRay, left: &mut Left<'_, '_, '_, '_>, child: Option<u32>) {
+    if entry.load(Ordering::Relaxed) != 0 && !ray.is_one_in_eight() {
+        return;
     }
+    let n_pieces = left.n_pieces(child);
+    let has_too_many = n_pieces > MOST_CHILDREN as u32;
+    let low = if has_too_many { ChordCone::NONE.to_bits() } else { COUNT | (RAYS_PER_PIECE * n_pieces) };
+    entry.store(number.word(low), Ordering::Relaxed);
+}
+
+/// Finds the cone of a block that enough rays have left.
+#[cold]
+#[inline(never)]
+fn find(number: Number, entry: &AtomicU64, left: &mut Left<'_, '_, '_, '_>, child: Option<u32>) -> ChordCone {
     let cone = left.cone(child);
     entry.store(number.word(cone.to_bits()), Ordering::Relaxed);
     cone
@@ -193,12 +219,23 @@ impl<'v> Left<'_, 'v, '_, '_> {
         }
     }
 
-    /// The cone of the patch or of a child of its first block; none if there are nodes below that.
+    /// The cells of the patch or of a child of its first block.
+    fn cells_of(&mut self, child: Option<u32>) -> CellRect {
+        let cells = self.cells();
+        child.map_or(cells, |child| child_cells(cells, child_side(cells), child % NODE_SIDE, child / NODE_SIDE))
+    }
+
+    /// Pieces over them.
+    fn n_pieces(&mut self, child: Option<u32>) -> u32 {
+        self.cells_of(child).size().map(|n| n.div_ceil(MAX_CELLS) as u32).iter().product()
+    }
+
+    /// The cone over them; none if there are nodes below a node.
     fn cone(&mut self, child: Option<u32>) -> ChordCone {
-        let (mut block, mut cells) = (self.visit.peek(self.root), self.cells());
+        let cells = self.cells_of(child);
+        let mut block = self.visit.peek(self.root);
         if let Some(child) = child {
             block = block.and_then(|block| self.visit.peek(block.child(child as usize)));
-            cells = child_cells(cells, child_side(cells), child % NODE_SIDE, child / NODE_SIDE);
         }
         let mut room = std::mem::take(&mut self.builder.pieces);
         let cone = self.cone_over(block, cells, room.places());
@@ -238,8 +275,8 @@ impl<'v> Left<'_, 'v, '_, '_> {
     }
 }
 
-/// The cells that a block is over.
+/// The cells that a block is over: in the head, which nodes and pieces have in common.
 #[inline(always)]
 fn cells_of(block: Block<'_>) -> CellRect {
-    if is_node(block.bytes()) { NodeView::new(block.bytes()).cells() } else { PieceView::new(block.bytes()).cells() }
+    NodeView::new(block.bytes()).cells()
 }
