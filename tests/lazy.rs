@@ -7,7 +7,7 @@ use common::random::Random;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use lazytess::cache::CacheConfig;
 use lazytess::ids::MeshId;
-use lazytess::math::{DBounds, Hit, Intersect, Ray};
+use lazytess::math::{DBounds, Hit, Intersect, PrimitiveRef, Ray};
 use lazytess::mesh::{ControlMesh, shapes};
 use lazytess::render::Tracer;
 use lazytess::scene::intersect::Intersector;
@@ -163,6 +163,22 @@ fn rays_said_to_start_above_a_surface_answer_as_if_they_were_not() {
         }
     }
     assert!(8 * n_spared > n_asked, "only {n_spared} of {n_asked} blocks were not looked at");
+}
+
+#[test]
+fn rays_from_triangles_that_are_not_there_are_traced() {
+    let world = world_of(vec![(shapes::cube(), DAffine3::IDENTITY, DicingRate::Fixed(20))]);
+    let cache = cache_of(&world, CacheConfig::with_bytes(1 << 20));
+    let mut tracer = Intersector::new(&world, &cache);
+    let ray = Ray::new(DVec3::new(0.1, 0.2, 10.0), -DVec3::Z);
+    let hit = tracer.closest(&ray).expect("a cube below");
+    for cell in [[999, 0], [0, 999], [20, 20], [32767, 32767]] {
+        let from = PrimitiveRef { cell, ..hit.primitive };
+        for _ in 0..200 {
+            let hit = tracer.closest(&Ray { from: Some(from), is_above: true, ..ray });
+            assert!(hit.is_none_or(|hit| hit.t > 1.0), "{cell:?}: {hit:?}");
+        }
+    }
 }
 
 /// Rays that leave the surface where one hits, to both sides, as a renderer makes them.
