@@ -200,7 +200,8 @@ impl<K: Kernel> Row<K> {
         match (piece.head.format, piece.columns()) {
             (2, MOST_COLUMNS) => Self::load::<2>(k, piece, j),
             (3, MOST_COLUMNS) => Self::load::<3>(k, piece, j),
-            _ => Self::of_few(k, piece, j),
+            (2, _) => Self::of_few::<2>(k, piece, j),
+            _ => Self::of_few::<3>(k, piece, j),
         }
     }
 
@@ -231,10 +232,11 @@ impl<K: Kernel> Row<K> {
 
     /// The same, number by number, of a row with fewer vertices.
     #[inline(always)]
-    fn of_few(k: K, piece: &PieceView<'_>, j: usize) -> Self {
-        let vertex = |i: usize| piece.vertex(i.min(piece.columns() - 1), j);
-        let of = |axis: usize| std::array::from_fn(|i| (vertex(i)[axis] - piece.head.base[axis]) as f32);
-        let [x, y, z] = &[0, 1, 2].map(of);
+    fn of_few<const BYTES: usize>(k: K, piece: &PieceView<'_>, j: usize) -> Self {
+        let (last, base) = (piece.columns() - 1, piece.head.base);
+        let vertices: [[i32; 3]; MOST_COLUMNS] = std::array::from_fn(|i| piece.read::<BYTES>(i.min(last), j));
+        let of = |axis: usize| vertices.map(|vertex| (vertex[axis] - base[axis]) as f32);
+        let [x, y, z] = &[of(0), of(1), of(2)];
         Self {
             low: [k.load(eight(x, 0)), k.load(eight(y, 0)), k.load(eight(z, 0))],
             high: [k.load(eight(x, 1)), k.load(eight(y, 1)), k.load(eight(z, 1))],
