@@ -36,7 +36,7 @@ pub struct GenerateArgs {
     #[arg(long, value_name = "N")]
     valence: Option<u32>,
     /// No progress bar
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 

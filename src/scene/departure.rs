@@ -33,7 +33,7 @@ const RAYS_PER_PIECE: u32 = 16;
 /// The cones of blocks that rays have left, for all threads.
 ///
 /// An entry is one word: the number of the block among those of all meshes and one more, on top; the cone below.
-/// So whoever reads it knows whose cone it is, and there is nothing to wait for.
+/// So whoever reads it knows whose cone it is, and there is nothing to wait for. Until the cone is known, rays that leave the block count down in its place.
 pub(super) struct Departures {
     /// A power of two of them; none if there are too many blocks for numbers of 32 bits.
     entries: Box<[AtomicU64]>,
