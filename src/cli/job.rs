@@ -140,7 +140,7 @@ impl Prepared<'_> {
     pub fn cache_within(&self, budget: u64, threads: usize) -> Result<CacheSize> {
         process::give_back_freed_memory();
         let resident = process::resident_bytes().unwrap_or(self.world.bytes() as u64);
-        let tables = GridCache::table_bytes_for(&self.world) + GridCache::working_bytes_for(&self.world);
+        let tables = GridCache::table_bytes_for(&self.world) + GridCache::departure_bytes_for(&self.world);
         let needs = RenderNeeds::new(resident, tables, self.settings, threads);
         Ok(CacheSize::Bytes(needs.cache_bytes(budget)?))
     }

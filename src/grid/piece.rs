@@ -14,10 +14,7 @@ const TAIL_BYTES: usize = 8;
 const LINE_BYTES: usize = 64;
 
 /// Bytes of the largest piece.
-pub const MOST_PIECE_BYTES: usize = {
-    let columns = MAX_CELLS + 1;
-    (HEAD_BYTES + 3 * columns * columns * VertexFormat::Four as usize + TAIL_BYTES).next_multiple_of(LINE_BYTES)
-};
+pub const MOST_PIECE_BYTES: usize = block_bytes([(MAX_CELLS / 2) as u8; 2], VertexFormat::Four as usize);
 
 /// How a vertex coordinate is stored: an unsigned offset from the piece's lowest corner.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -67,14 +64,14 @@ pub struct PieceLayout {
 
 /// Bytes of a piece with `lanes` blocks of 2x2 cells along u and v.
 #[inline(always)]
-fn block_bytes(lanes: [u8; 2], format: usize) -> usize {
+const fn block_bytes(lanes: [u8; 2], format: usize) -> usize {
     used_bytes(lanes, format).next_multiple_of(LINE_BYTES)
 }
 
 /// The same, up to the last byte that may be loaded.
 #[inline(always)]
-fn used_bytes(lanes: [u8; 2], format: usize) -> usize {
-    let [columns, rows] = lanes.map(|n| 2 * usize::from(n) + 1);
+const fn used_bytes(lanes: [u8; 2], format: usize) -> usize {
+    let (columns, rows) = (2 * lanes[0] as usize + 1, 2 * lanes[1] as usize + 1);
     HEAD_BYTES + 3 * columns * rows * format + TAIL_BYTES
 }
 

@@ -111,7 +111,7 @@ impl Departures {
     #[inline(always)]
     fn left_child(&self, ray: &LatticeRay, patch: Number, left: &mut Left<'_, '_, '_, '_>) -> u32 {
         let cells = left.cells();
-        if cells.i1.max(cells.j1) as usize <= MAX_CELLS {
+        if is_piece(cells) {
             return 0;
         }
         let child = child_of_start(cells, ray);
@@ -153,12 +153,10 @@ fn entries_for(n_slots: usize) -> usize {
 /// The child of a patch's first node, which is over these cells, in which the ray's triangle lies.
 #[inline(always)]
 fn child_of_start(cells: CellRect, ray: &LatticeRay) -> u32 {
-    const MOST_CELLS: u16 = (NODE_SIDE * MAX_CELLS as u32) as u16;
     // Whoever names a triangle that is not there leaves somewhere else, but does not stop the program.
     let [i, j] = ray.start_cell();
     let (i, j) = (i.min(u32::from(cells.i1) - 1), j.min(u32::from(cells.j1) - 1));
-    let side = if cells.i1.max(cells.j1) <= MOST_CELLS { MAX_CELLS as u32 } else { child_side(cells) };
-    let shift = side.trailing_zeros();
+    let shift = child_side(cells).trailing_zeros();
     (j >> shift) * NODE_SIDE + (i >> shift)
 }
 
@@ -218,25 +216,26 @@ impl<'v> Left<'_, 'v, '_, '_> {
     #[inline(always)]
     fn cells(&mut self) -> CellRect {
         match self.visit.peek(self.root) {
-            Some(block) => cells_of(block),
+            // In the head, which nodes and pieces have in common.
+            Some(block) => NodeView::new(block.bytes()).cells(),
             None => self.builder.cells_of(self.of),
         }
     }
 
     /// The cells of the patch or of a child of its first block.
-    fn cells_of(&mut self, child: Option<u32>) -> CellRect {
+    fn cells_over(&mut self, child: Option<u32>) -> CellRect {
         let cells = self.cells();
         child.map_or(cells, |child| child_cells(cells, child_side(cells), child % NODE_SIDE, child / NODE_SIDE))
     }
 
     /// Pieces over them.
     fn n_pieces(&mut self, child: Option<u32>) -> u32 {
-        self.cells_of(child).size().map(|n| n.div_ceil(MAX_CELLS) as u32).iter().product()
+        self.cells_over(child).size().map(|n| n.div_ceil(MAX_CELLS) as u32).iter().product()
     }
 
     /// The cone over them; none if there are nodes below a node.
     fn cone(&mut self, child: Option<u32>) -> ChordCone {
-        let cells = self.cells_of(child);
+        let cells = self.cells_over(child);
         let mut block = self.visit.peek(self.root);
         if let Some(child) = child {
             block = block.and_then(|block| self.visit.peek(block.child(child as usize)));
@@ -277,10 +276,4 @@ impl<'v> Left<'_, 'v, '_, '_> {
         }
         ChordCone::of_pieces(pieces.into_iter().flatten())
     }
-}
-
-/// The cells that a block is over: in the head, which nodes and pieces have in common.
-#[inline(always)]
-fn cells_of(block: Block<'_>) -> CellRect {
-    NodeView::new(block.bytes()).cells()
 }

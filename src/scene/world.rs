@@ -482,8 +482,8 @@ impl GridCache {
         world.meshes.iter().map(|m| m.top.n_slots()).map(|n| 8 * n + 8 * n.div_ceil(64)).sum()
     }
 
-    /// Bytes that tracing a world takes for what all threads remember, whatever the number of faces: 128 KiB at most.
-    pub fn working_bytes_for(world: &World) -> usize {
+    /// Bytes of what all threads remember of patches that rays leave, whatever the number of faces: 128 KiB at most.
+    pub fn departure_bytes_for(world: &World) -> usize {
         Departures::bytes_for(world.meshes.iter().map(|m| m.top.n_slots()).sum())
     }
 
