@@ -8,7 +8,7 @@
 #![cfg(loom)]
 
 use lazytess::cache::{
-    Block, BlockLayout, CacheConfig, CacheStatistics, Capacity, Claim, Pin, Reinsert, SegmentCache, Slot, SlotId,
+    Block, BlockLayout, CacheConfig, CacheStatistics, Capacity, Claim, MemoTable, Pin, Reinsert, SegmentCache, Slot, SlotId,
     SlotTable, Visit,
 };
 use loom::thread;
@@ -294,5 +294,44 @@ fn three_threads() {
         toy.visit(&mut toy.cache.pin(), &[2]);
         one.join().unwrap();
         two.join().unwrap();
+    });
+}
+
+/// One entry for all numbers: whoever reads what is known of one reads nothing of the others.
+#[test]
+fn what_is_remembered_is_read_as_it_was_written() {
+    fn of(number: u32) -> [u64; 3] {
+        [1, 2, 3].map(|k| u64::from(number) << 8 | k)
+    }
+    fn look(table: &MemoTable, numbers: &[u32]) {
+        for &number in numbers {
+            table.get(number).into_iter().for_each(|words| assert_eq!(words, of(number)));
+        }
+    }
+    explore(Some(3), || {
+        let table = Arc::new(MemoTable::new(1));
+        let shared = table.clone();
+        let other = thread::spawn(move || {
+            shared.put(0, of(0));
+            look(&shared, &[1]);
+            if !shared.is_due(1, true, || 0) && shared.is_due(1, false, || 0) {
+                shared.put(1, of(1));
+            }
+        });
+        look(&table, &[0, 1]);
+        table.put(1, of(1));
+        table.put(0, of(0));
+        look(&table, &[0]);
+        other.join().unwrap();
+    });
+    explore(Some(2), || {
+        let table = Arc::new(MemoTable::new(1));
+        table.put(0, of(0));
+        let others = [1, 0].map(|number| {
+            let shared = table.clone();
+            thread::spawn(move || shared.put(number, of(number)))
+        });
+        look(&table, &[0, 1]);
+        others.into_iter().for_each(|other| other.join().unwrap());
     });
 }

@@ -93,12 +93,13 @@
 //! Idea: Benthin et al., "Efficient Ray Tracing of Subdivision Surfaces using Tessellation Caching", HPG 2015, whose
 //! cache makes all threads stop to recycle a segment; the pins are Fraser's epochs (2004) with a grace period.
 //!
-//! What other sizes would do is replayed from a **trace** of accesses (`trace.rs`, `replay.rs`).
+//! What is found out about things with numbers is remembered in a table beside the blocks (`memo.rs`). What other sizes would do is replayed from a **trace** of accesses (`trace.rs`, `replay.rs`).
 //!
 //! Read `pin.rs` first, then `segment.rs`, then `ticket.rs`.
 
 mod block;
 mod config;
+mod memo;
 mod memory;
 mod pin;
 #[cfg(all(test, not(loom)))]
@@ -117,6 +118,7 @@ mod word;
 
 pub use block::{Block, BlockLayout};
 pub use config::{CacheConfig, Capacity, Reinsert};
+pub use memo::MemoTable;
 pub use pin::{Pin, Visit};
 pub use replay::{Policy, Replay, Replayed};
 pub use slot::{Slot, SlotId, SlotTable};

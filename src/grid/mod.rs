@@ -24,18 +24,18 @@
 //! 4. Every kernel gives the same bits.
 //! 5. Of two hits at equal t the smaller [`TriangleId`] wins, so the order of tests does not matter.
 //!
-//! Read [`ray`](LatticeRay), then `boxes.rs`, `piece.rs`, `triangles.rs`; `chords.rs` spares rays the surface that they leave.
+//! Read [`ray`](LatticeRay), then `boxes.rs`, `piece.rs`, `triangles.rs`; `horizon.rs` spares rays the surface that they leave.
 
 mod boxes;
-mod chords;
 mod hit;
+mod horizon;
 mod node;
 mod piece;
 mod ray;
 mod triangles;
 
 pub use boxes::{CellRect, HEAD_BYTES, LaneHits, lane_mask};
-pub use chords::ChordCone;
+pub use horizon::Horizon;
 pub use hit::{LatticeHit, TriangleId};
 pub use node::{NODE_BYTES, NodeView, encode_node, is_node};
 pub use piece::{MAX_CELLS, MOST_PIECE_BYTES, PieceLayout, PieceView, VertexFormat};

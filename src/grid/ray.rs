@@ -1,7 +1,6 @@
 //! A ray made ready for boxes and triangles of the lattice.
 
 use super::TriangleId;
-use crate::ids::PatchId;
 use crate::math::simd::{Kernel, Portable};
 use glam::DVec3;
 
@@ -251,16 +250,16 @@ impl LatticeRay {
         self.shear[0].to_bits().is_multiple_of(8)
     }
 
+    /// The direction as boxes see it: scaled, and rounded twice more than that of the ray.
+    pub fn direction(&self) -> DVec3 {
+        let [x, y, z, ..] = self.inv;
+        1.0 / DVec3::new(f64::from(x), f64::from(y), f64::from(z))
+    }
+
     /// The cell of the triangle that is not hit.
     #[inline(always)]
     pub fn start_cell(&self) -> [u32; 2] {
         [self.skip.i(), self.skip.j()]
-    }
-
-    /// Whether the triangle that is not hit is one of this patch.
-    #[inline(always)]
-    pub fn starts_on(&self, patch: PatchId) -> bool {
-        self.skip.patch() == patch
     }
 
     /// Where the ray ends, in lattice space's units of t; negative for a ray that hits nothing.

@@ -95,8 +95,9 @@ impl Task for ClosestInMesh<'_, '_> {
         if !mesh.entrance().is_in_reach(kernel, entering) {
             return None;
         }
-        let leaving = Leaving::of(ray, id, mesh, cache.departures());
-        let ray = &lattice_ray(kernel, entering, id, ray, t_max);
+        let in_lattice = &lattice_ray(kernel, entering, id, ray, t_max);
+        let leaving = Leaving::of(kernel, ray, (id, mesh), in_lattice, cache.departures());
+        let ray = in_lattice;
         let walk = mesh.top().walk(kernel, ray, &mut stacks.mesh);
         Leaves { id, mesh, cache, visit: &pin.visit(), builder, leaving, ray }.closest(kernel, walk)
     }
@@ -153,17 +154,19 @@ impl Leaves<'_, '_, '_, '_> {
         while let Some(leaf) = walk.nearest(hit.t, |slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let root = visit.root(table, SlotId(leaf.slot));
-            let Some(left_out) = leaving.left_out(ray, of, leaf.slot, builder, visit, root) else { continue };
+            if leaving.has_left(ray, of, builder, visit, root) {
+                continue;
+            }
             if let Some(block) = visit.get(root) {
                 builder.note_root(of, leaf.slot, block);
-                ClosestInPatch { builder, at: InPatch { visit, block, left_out, depth: 0, of, ray }, hit }.run(kernel);
+                ClosestInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray }, hit }.run(kernel);
             } else {
                 // Apart, so that a block that is there stays in registers.
                 let block = builder.build_root(visit, of, cache, leaf.slot);
                 builder.note_root(of, leaf.slot, block);
                 kernel.enter(ClosestInPatch {
                     builder,
-                    at: InPatch { visit, block, left_out, depth: 0, of, ray },
+                    at: InPatch { visit, block, depth: 0, of, ray },
                     hit,
                 });
             }
@@ -190,22 +193,25 @@ impl Task for OccludedInMesh<'_, '_> {
         if !mesh.entrance().is_in_reach(kernel, entering) {
             return false;
         }
-        let leaving = Leaving::of(ray, id, mesh, cache.departures());
-        let ray = &lattice_ray(kernel, entering, id, ray, ray.t_max);
+        let in_lattice = &lattice_ray(kernel, entering, id, ray, ray.t_max);
+        let leaving = Leaving::of(kernel, ray, (id, mesh), in_lattice, cache.departures());
+        let ray = in_lattice;
         let table = cache.table(id);
         let visit = &pin.visit();
         let mut walk = mesh.top().walk_any(kernel, ray, &mut stacks.mesh);
         while let Some(leaf) = walk.next(|slot| visit.prefetch(visit.root(table, SlotId(slot)))) {
             let of = PatchContext { id, mesh, patch: mesh.patch_of_leaf(leaf.patch) };
             let root = visit.root(table, SlotId(leaf.slot));
-            let Some(left_out) = leaving.left_out(ray, of, leaf.slot, builder, visit, root) else { continue };
+            if leaving.has_left(ray, of, builder, visit, root) {
+                continue;
+            }
             let is_hit = if let Some(block) = visit.get(root) {
                 builder.note_root(of, leaf.slot, block);
-                OccludedInPatch { builder, at: InPatch { visit, block, left_out, depth: 0, of, ray } }.run(kernel)
+                OccludedInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray } }.run(kernel)
             } else {
                 let block = builder.build_root(visit, of, cache, leaf.slot);
                 builder.note_root(of, leaf.slot, block);
-                kernel.enter(OccludedInPatch { builder, at: InPatch { visit, block, left_out, depth: 0, of, ray } })
+                kernel.enter(OccludedInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray } })
             };
             if is_hit {
                 return true;

@@ -14,8 +14,6 @@ use crate::math::simd::{Kernel, Task};
 pub(super) struct InPatch<'a, 'v, 'p> {
     pub visit: &'v Visit<'p>,
     pub block: Block<'v>,
-    /// Children of the block that the ray is known not to meet, as bits.
-    pub left_out: u32,
     /// Nodes above the block.
     pub depth: usize,
     pub of: PatchContext<'a>,
@@ -44,7 +42,7 @@ impl<'v> InPatch<'_, 'v, '_> {
 
     #[inline(always)]
     fn below(self, block: Block<'v>) -> Self {
-        Self { block, left_out: 0, depth: self.depth + 1, ..self }
+        Self { block, depth: self.depth + 1, ..self }
     }
 }
 
@@ -73,7 +71,6 @@ impl Task for ClosestInPatch<'_, '_, '_, '_> {
             return;
         }
         let mut children = NodeView::new(block.bytes()).test(kernel, ray, hit.t);
-        children.mask &= !at.left_out;
         let Some(mut lane) = children.pop_nearest(hit.t) else { return };
         at.prefetch_children(children.mask);
         loop {
@@ -110,7 +107,7 @@ impl Task for OccludedInPatch<'_, '_, '_, '_> {
         if !is_node(block.bytes()) {
             return PieceView::new(block.bytes()).occluded(kernel, ray, of.patch);
         }
-        let mut children = NodeView::new(block.bytes()).lanes_met(kernel, ray, ray.t_max()) & !at.left_out;
+        let mut children = NodeView::new(block.bytes()).lanes_met(kernel, ray, ray.t_max());
         at.prefetch_children(children & children.wrapping_sub(1));
         while children != 0 {
             let lane = children.trailing_zeros() as usize;

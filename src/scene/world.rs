@@ -406,7 +406,7 @@ impl GridCache {
         let bits = |n: usize| (0..n.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
         Ok(Self {
             tables,
-            departures: Departures::new(n_slots()),
+            departures: Departures::new(world.meshes.iter().map(|m| m.surface.n_patches())),
             touched: n_slots().map(bits).collect(),
             triangles_built: AtomicU64::new(0),
             pieces_built: AtomicU64::new(0),
@@ -482,9 +482,9 @@ impl GridCache {
         world.meshes.iter().map(|m| m.top.n_slots()).map(|n| 8 * n + 8 * n.div_ceil(64)).sum()
     }
 
-    /// Bytes of what all threads remember of patches that rays leave, whatever the number of faces: 128 KiB at most.
+    /// Bytes of what all threads remember of patches that rays leave, whatever the number of faces: 512 KiB at most.
     pub fn departure_bytes_for(world: &World) -> usize {
-        Departures::bytes_for(world.meshes.iter().map(|m| m.top.n_slots()).sum())
+        Departures::bytes_for(world.meshes.iter().map(|m| m.surface.n_patches()).sum())
     }
 
     /// Bytes of slots and marks, the arena not included.

@@ -1,7 +1,7 @@
 //! Pieces and nodes against slow, obvious code.
 
 mod boxes;
-mod chords;
+mod horizon;
 mod encoding;
 mod rays;
 mod slow;
