@@ -8,8 +8,8 @@
 #![cfg(loom)]
 
 use lazytess::cache::{
-    Block, BlockLayout, CacheConfig, CacheStatistics, Capacity, Claim, MemoTable, Pin, Reinsert, SegmentCache, Slot, SlotId,
-    SlotTable, Visit,
+    Block, BlockLayout, CacheConfig, CacheStatistics, Capacity, Claim, MemoTable, Pin, Reinsert, SegmentCache, Slot,
+    SlotId, SlotTable, Visit,
 };
 use loom::thread;
 use std::sync::Arc;

@@ -91,8 +91,8 @@ impl MemoTable {
     pub fn put(&self, number: u32, words: [u64; 3]) {
         let Some(entry) = self.entry(number) else { return };
         let label = entry.label.load(Ordering::Relaxed);
-        let is_mine = label != BUSY
-            && entry.label.compare_exchange(label, BUSY, Ordering::Acquire, Ordering::Relaxed).is_ok();
+        let is_mine =
+            label != BUSY && entry.label.compare_exchange(label, BUSY, Ordering::Acquire, Ordering::Relaxed).is_ok();
         if !is_mine {
             return;
         }

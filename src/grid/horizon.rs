@@ -5,7 +5,7 @@
 use super::{CellRect, LatticeRay, MAX_CELLS, PieceView, VertexFormat};
 use crate::math::simd::{self, Kernel, Task};
 use bytemuck::{Pod, Zeroable};
-use glam::{IVec3, Vec3};
+use glam::{DVec2, DVec3, IVec3, Vec3};
 
 /// Parts into which a patch's cells are divided along u, and along v: where in it a ray starts is known that well.
 const PARTS: usize = 4;
@@ -21,10 +21,11 @@ const MOST_STEEP: f32 = 0.9375;
 /// The rise of what nobody clears.
 const NEVER: i8 = i8::MAX;
 
-/// The greatest slope across that is tried.
-const MOST_RISE: f32 = 500.0;
+/// One less the product of how far edges lead astray, at least.
+const LEAST_SHARE: f32 = 0.05;
 
-const PASSES: usize = 1;
+/// How often bounds on slopes are made tighter.
+const ROUNDS: usize = 2;
 
 const MARGIN: f32 = 1.0 / 1024.0;
 
@@ -39,6 +40,9 @@ const TINY: f32 = 1e-30;
 
 /// The slope of parts without cells.
 const NO_EDGE: f32 = f32::MIN;
+
+/// This is taken from the slopes of edges that do not count.
+const HIDDEN: f32 = 1e30;
 
 /// How steeply **chords** rise from where they start: from any point p of a patch's surface to any other, q.
 ///
@@ -88,15 +92,15 @@ impl Horizon {
     /// Of a surface that may be seen from itself anywhere.
     pub const NONE: Self = Self { frame: [[BIAS, BIAS, BIAS, 0]; 2], rises: [[[0; PARTS]; 2]; 2] };
 
-    /// The horizon of all pieces of one grid together, which is over these cells, on the side to which the ray leaves it;
+    /// The horizon of all pieces of one grid together, on the side to which the ray leaves it;
     /// [`NONE`](Self::NONE) if the surface is too steep.
     pub fn of_pieces<'a>(
         pieces: impl Iterator<Item = PieceView<'a>> + Clone,
-        cells: CellRect,
+        borders: &Borders,
         ray: &LatticeRay,
     ) -> Self {
         let is_turned = pieces.clone().any(|piece| leaves_below(&piece, ray));
-        simd::run(OfPieces { pieces, cells, is_turned })
+        simd::run(OfPieces { pieces, borders, is_turned })
     }
 
     /// In three words.
@@ -178,30 +182,76 @@ fn leaves_below(piece: &PieceView<'_>, ray: &LatticeRay) -> bool {
     (b - a).cross(c - a).dot(ray.direction()) < 0.0
 }
 
-struct OfPieces<I> {
+/// Where the vertices of a patch's grid lie: those of a side with fewer segments than the grid has cells have moved to the segments' ends.
+pub struct Borders {
+    /// All cells of the patch.
+    pub cells: CellRect,
+    /// Of the sides v = 0, u = 1, v = 1 and u = 0: where each of the vertices lies along u or v, in cells. Empty where none has moved.
+    pub moved: [Vec<f64>; 4],
+}
+
+impl Borders {
+    /// Which of the moved sides a part of the grid has cells at.
+    fn moved_sides(&self, part: CellRect) -> [bool; 4] {
+        let CellRect { i0, i1, j0, j1 } = self.cells;
+        let [low, right, high, left] = &self.moved;
+        [
+            !low.is_empty() && part.j0 == j0,
+            !right.is_empty() && part.i1 == i1,
+            !high.is_empty() && part.j1 == j1,
+            !left.is_empty() && part.i0 == i0,
+        ]
+    }
+
+    /// Where a vertex lies, in cells.
+    fn place(&self, [i, j]: [usize; 2]) -> DVec2 {
+        let [n_u, n_v] = self.cells.size();
+        let [low, right, high, left] = &self.moved;
+        let along = |is_there: bool, side: &[f64], k: usize| side.get(k).copied().filter(|_| is_there);
+        let u = along(j == 0, low, i).or(along(j == n_v, high, i)).unwrap_or(i as f64);
+        let v = along(i == 0, left, j).or(along(i == n_u, right, j)).unwrap_or(j as f64);
+        DVec2::new(u, v)
+    }
+
+    /// How far vertices have moved along u, and along v, at most.
+    fn farthest(&self) -> [f64; 2] {
+        [0, 1].map(|axis| {
+            let ways = [axis, axis + 2].map(|side| {
+                let ways = self.moved[side].iter().enumerate().map(|(k, place)| (place - k as f64).abs());
+                ways.fold(0.0, f64::max)
+            });
+            ways[0].max(ways[1])
+        })
+    }
+}
+
+struct OfPieces<'a, I> {
     pieces: I,
-    cells: CellRect,
+    borders: &'a Borders,
     is_turned: bool,
 }
 
-impl<'a, I: Iterator<Item = PieceView<'a>> + Clone> Task for OfPieces<I> {
+impl<'a, I: Iterator<Item = PieceView<'a>> + Clone> Task for OfPieces<'_, I> {
     type Output = Horizon;
 
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) -> Horizon {
-        let Self { pieces, cells, is_turned } = self;
+        let Self { pieces, borders, is_turned } = self;
         // Corners of 32-bit pieces are no exact floats.
         if pieces.clone().any(|piece| piece.head.format == VertexFormat::Four as u8) {
             return Horizon::NONE;
         }
         let Some(frame) = Frame::of_pieces(pieces.clone()) else { return Horizon::NONE };
-        let mut most = [0.0; 2];
-        let mut slopes = frame.slopes(k, pieces.clone(), cells, most);
-        for pass in 0..PASSES {
-            most = if pass == 0 { slopes.bounds() } else { slopes.both() };
-            slopes = frame.slopes(k, pieces.clone(), cells, most);
+        let Some(strips) = Strip::of_pieces(pieces.clone(), borders) else { return Horizon::NONE };
+        let by = [frame.measure_of(0), frame.measure_of(1)];
+        let mut slopes = Slopes::new(borders, is_turned);
+        for piece in pieces {
+            measure(k, by, &piece, borders.moved_sides(piece.cells()), &mut slopes);
         }
-        frame.horizon(slopes, most, is_turned)
+        for strip in strips {
+            strip.measure(k, by, &mut slopes);
+        }
+        frame.horizon(&slopes)
     }
 }
 
@@ -224,8 +274,6 @@ struct Measure {
     along: Vec3,
     across: Vec3,
     up: Vec3,
-    /// Slope across.
-    most: f32,
     errors: [f32; 2],
 }
 
@@ -240,51 +288,72 @@ struct Steepest<F> {
     astray: F,
 }
 
-/// How steep the edges of each part are at most, along u and along v.
+/// How steep the surface is at most, along u and along v.
 struct Slopes {
+    n_cells: [usize; 2],
+    /// Triangles reach so many cells beyond their own, or rays start there, along u and along v.
+    reach: [usize; 2],
+    /// What is fallen is risen.
+    is_turned: bool,
     parts: [u8; 2],
-    rise: [[f32; PARTS]; 2],
-    fall: [[f32; PARTS]; 2],
-    astray: [f32; 2],
+    /// In each part.
+    own: [[Steepest<f32>; PARTS]; 2],
+    /// By the last part from which it may be ahead, to where u or v grows, and to where it shrinks.
+    ahead: [[[Steepest<f32>; PARTS]; 2]; 2],
 }
 
 impl Slopes {
-    fn new(cells: CellRect) -> Self {
-        let none = [[NO_EDGE; PARTS]; 2];
-        Self { parts: cells.size().map(parts_per_cell), rise: none, fall: none, astray: [0.0; 2] }
+    fn new(borders: &Borders, is_turned: bool) -> Self {
+        let n_cells = borders.cells.size();
+        let reach = borders.farthest().map(|far| (2.0 * far).ceil() as usize);
+        let (own, ahead) = ([[Steepest::NONE; PARTS]; 2], [[[Steepest::NONE; PARTS]; 2]; 2]);
+        Self { n_cells, reach, is_turned, parts: n_cells.map(parts_per_cell), own, ahead }
     }
 
-    /// Takes in edges along u (0) or v (1) of cell `cell` in that direction.
+    /// Takes in slopes along u (0) or v (1) of cell `cell` in that direction.
     #[inline(always)]
-    fn add(&mut self, axis: usize, cell: usize, rise: f32, fall: f32) {
-        let part = part(cell as u32, self.parts[axis]) as usize;
-        self.rise[axis][part] = self.rise[axis][part].max(rise);
-        self.fall[axis][part] = self.fall[axis][part].max(fall);
+    fn add(&mut self, axis: usize, cell: usize, seen: Steepest<f32>) {
+        let (reach, last) = (self.reach[axis], self.n_cells[axis] - 1);
+        let part = |cell: usize| part(cell as u32, self.parts[axis]) as usize;
+        self.own[axis][part(cell)].take_in(seen);
+        self.ahead[axis][0][part((cell + reach).min(last))].take_in(seen);
+        self.ahead[axis][1][part(cell.saturating_sub(reach))].take_in(seen);
     }
 
-    /// Slopes that no plane exceeds, if these are the slopes of edges that lead nowhere astray.
-    fn bounds(&self) -> [f32; 2] {
-        let ([r_u, r_v], [k_u, k_v]) = (self.both(), self.astray);
-        let share = 1.0 - k_u * k_v;
-        let most = if share > 0.1 { [(r_u + r_v * k_u) / share, (r_v + r_u * k_v) / share] } else { [MOST_RISE; 2] };
-        most.map(|s| (s * (1.0 + MARGIN)).min(MOST_RISE))
+    /// Bounds on the slopes of planes, by those of edges; `None` if there are none.
+    fn bounds(&self) -> Option<[f32; 2]> {
+        let of = |axis: usize| {
+            self.own[axis].into_iter().reduce(|mut all, part| {
+                all.take_in(part);
+                all
+            })
+        };
+        let [u, v] = [of(0)?, of(1)?];
+        let ([r_u, r_v], share) = ([u, v].map(|s| s.rise.max(s.fall).max(0.0)), 1.0 - u.astray * v.astray);
+        let mut most = [(r_u + r_v * u.astray) / share, (r_v + r_u * v.astray) / share].map(|s| s * (1.0 + MARGIN));
+        // Infinite where the surface is folded.
+        if share.is_nan() || share < LEAST_SHARE || !most.iter().all(|s| s.is_finite()) {
+            return None;
+        }
+        // Bounds that no part exceeds with them are bounds as well.
+        for _ in 0..ROUNDS {
+            let of = |axis: usize| {
+                let parts = self.own[axis].map(|part| part.with(most[1 - axis]));
+                parts.as_flattened().iter().copied().fold(0.0, f32::max)
+            };
+            most = [of(0).min(most[0]), of(1).min(most[1])];
+        }
+        Some(most)
     }
 
-    /// The steepest edges of each part and all beyond it, to where u or v grows and to where it shrinks.
-    fn beyond(&self, axis: usize) -> [[f32; PARTS]; 2] {
-        let (mut to_more, mut to_less) = (self.rise[axis], self.fall[axis]);
+    /// How steep what is ahead of each part is, to where u or v grows and to where it shrinks.
+    fn beyond(&self, axis: usize, most: f32) -> [[f32; PARTS]; 2] {
+        let [to_more, to_less] = self.ahead[axis].map(|way| way.map(|part| part.with(most)));
+        let of = |way: usize| move |slopes: [f32; 2]| slopes[if self.is_turned { 1 - way } else { way }];
+        let (mut to_more, mut to_less) = (to_more.map(of(0)), to_less.map(of(1)));
         (1..PARTS).for_each(|part| to_less[part] = to_less[part].max(to_less[part - 1]));
         (1..PARTS).rev().for_each(|part| to_more[part - 1] = to_more[part - 1].max(to_more[part]));
         [to_more, to_less]
-    }
-
-    fn both(&self) -> [f32; 2] {
-        [self.greatest(0), self.greatest(1)]
-    }
-
-    /// The greatest slope along u or v, to either side.
-    fn greatest(&self, axis: usize) -> f32 {
-        self.rise[axis].into_iter().chain(self.fall[axis]).fold(0.0, f32::max)
     }
 }
 
@@ -303,69 +372,25 @@ impl Frame {
         let (of_u, of_v) = (of_u.try_normalize()?, of_v.try_normalize()?);
         let normal = of_u.cross(of_v).try_normalize()?;
         // Each at a right angle to the other's edges.
-        let packed = [of_v.cross(normal), normal.cross(of_u)].map(|m| {
-            (m * (PACKED / m.abs().max_element())).round().to_array().map(|x| x as i8)
-        });
+        let packed = [of_v.cross(normal), normal.cross(of_u)]
+            .map(|m| (m * (PACKED / m.abs().max_element())).round().to_array().map(|x| x as i8));
         let along = packed.map(|m| Vec3::from_array(m.map(f32::from)));
         Some(Self { packed, along, up: along[0].cross(along[1]) })
     }
 
-    #[inline(always)]
-    fn slopes<'a, K: Kernel>(
-        &self,
-        k: K,
-        pieces: impl Iterator<Item = PieceView<'a>>,
-        cells: CellRect,
-        most: [f32; 2],
-    ) -> Slopes {
-        let mut slopes = Slopes::new(cells);
-        for piece in pieces {
-            self.measure(k, &piece, most, &mut slopes);
-        }
-        slopes
-    }
-
-    fn measure_of(&self, axis: usize, most: [f32; 2]) -> Measure {
+    fn measure_of(&self, axis: usize) -> Measure {
         const ERROR: f32 = 1.0 / 1_048_576.0;
         let errors = [PACKED, self.up.abs().max_element()].map(|most| most * ERROR);
-        Measure { along: self.along[axis], across: self.along[1 - axis], up: self.up, most: most[1 - axis], errors }
+        Measure { along: self.along[axis], across: self.along[1 - axis], up: self.up, errors }
     }
 
-    /// Takes in all edges of a piece.
-    #[inline(always)]
-    fn measure<K: Kernel>(&self, k: K, piece: &PieceView<'_>, most: [f32; 2], slopes: &mut Slopes) {
-        let (CellRect { i0, j0, .. }, [n_u, n_v]) = (piece.cells(), piece.cells().size());
-        let (by_u, by_v) = (self.measure_of(0, most), self.measure_of(1, most));
-        let mut row = Row::of(k, piece, 0);
-        let mut of_u = by_u.steeper(k, edges(k, row.low, row.high), Steepest::none(k));
-        for j in 1..=n_v {
-            let next = Row::of(k, piece, j);
-            of_u = by_u.steeper(k, edges(k, next.low, next.high), of_u);
-            let of_v = by_v.steeper(k, edges(k, row.low, next.low), Steepest::none(k));
-            let of_v = by_v.steeper(k, edges(k, row.high, next.high), of_v);
-            let Steepest { rise, fall, astray } = of_v.greatest(k);
-            slopes.add(1, usize::from(j0) + j - 1, rise, fall);
-            slopes.astray[1] = slopes.astray[1].max(astray);
-            row = next;
-        }
-        let (rise, fall) = (k.store(of_u.rise), k.store(of_u.fall));
-        for lane in 0..n_u {
-            slopes.add(0, usize::from(i0) + lane, rise[lane], fall[lane]);
-        }
-        slopes.astray[0] = slopes.astray[0].max(of_u.greatest(k).astray);
-    }
-
-    /// The horizon of a surface with these slopes, found with bounds on slopes across; [`NONE`](Horizon::NONE) if they do not hold.
-    fn horizon(&self, mut slopes: Slopes, most: [f32; 2], is_turned: bool) -> Horizon {
-        if !(slopes.greatest(0) <= most[0] && slopes.greatest(1) <= most[1]) {
-            return Horizon::NONE;
-        }
-        if is_turned {
-            std::mem::swap(&mut slopes.rise, &mut slopes.fall);
-        }
-        let mut rises = [0, 1].map(|axis| slopes.beyond(axis).map(|way| way.map(rounded_up)));
+    /// The horizon of a surface with these slopes; [`NONE`](Horizon::NONE) if it is too steep.
+    fn horizon(&self, slopes: &Slopes) -> Horizon {
+        let Some(most) = slopes.bounds() else { return Horizon::NONE };
+        let mut rises = [0, 1].map(|axis| slopes.beyond(axis, most[1 - axis]).map(|way| way.map(rounded_up)));
+        let is_gentle = most[0] * self.along[0].length() + most[1] * self.along[1].length() < 0.9 * self.up.length();
         for (u, v) in (0..PARTS).flat_map(|v| (0..PARTS).map(move |u| (u, v))) {
-            if self.is_too_steep(&rises, &slopes, [u, v]) {
+            if !is_gentle && self.is_too_steep(&rises, slopes, most, [u, v]) {
                 let of = |axis: usize, part: usize| rises[axis].map(|way| way[part]);
                 let (axis, part) = if of(0, u).iter().max() > of(1, v).iter().max() { (0, u) } else { (1, v) };
                 rises[axis].iter_mut().for_each(|way| way[part] = NEVER);
@@ -376,18 +401,22 @@ impl Frame {
             [x, y, z, slopes.parts[axis]]
         };
         let mut frame = [frame_of(0), frame_of(1)];
-        frame[0][3] |= if is_turned { IS_TURNED } else { 0 };
+        frame[0][3] |= if slopes.is_turned { IS_TURNED } else { 0 };
         Horizon { frame, rises }
     }
 
     /// Whether the normal of a triangle in this part of the patch may be below one of the planes of chords from there.
-    fn is_too_steep(&self, rises: &[[[i8; PARTS]; 2]; 2], slopes: &Slopes, parts: [usize; 2]) -> bool {
+    fn is_too_steep(&self, rises: &[[[i8; PARTS]; 2]; 2], slopes: &Slopes, most: [f32; 2], parts: [usize; 2]) -> bool {
         let rises = [0, 1].map(|axis| rises[axis].map(|way| way[parts[axis]]));
-        let own = [0, 1].map(|axis| [slopes.rise[axis], slopes.fall[axis]].map(|way| way[parts[axis]]));
-        if rises.as_flattened().contains(&NEVER) || own.as_flattened().contains(&NO_EDGE) {
+        let own = [0, 1].map(|axis| slopes.own[axis][parts[axis]]);
+        if rises.as_flattened().contains(&NEVER) || own.iter().any(|part| part.rise == NO_EDGE) {
             return false;
         }
         let least = -MOST_STEEP * self.up.length_squared();
+        let mut own = [own[0].with(most[1]), own[1].with(most[0])];
+        if slopes.is_turned {
+            own.iter_mut().for_each(|ways| ways.reverse());
+        }
         let (planes, triangles) = (self.corners(rises.map(|r| r.map(f32::from))), self.corners(own));
         planes.iter().any(|plane| triangles.iter().any(|triangle| plane.dot(*triangle) < least))
     }
@@ -411,30 +440,178 @@ impl<F: Copy> Steepest<F> {
         Self { rise: k.splat(NO_EDGE), fall: k.splat(NO_EDGE), astray: k.splat(0.0) }
     }
 
-    /// Of all lanes.
+    /// One lane after the other.
     #[inline(always)]
-    fn greatest<K: Kernel<F = F>>(self, k: K) -> Steepest<f32> {
+    fn lanes<K: Kernel<F = F>>(self, k: K) -> [Steepest<f32>; 8] {
         let [rise, fall, astray] = [k.store(self.rise), k.store(self.fall), k.store(self.astray)];
-        let greatest = |lanes: [f32; 8]| lanes.into_iter().fold(NO_EDGE, f32::max);
-        Steepest { rise: greatest(rise), fall: greatest(fall), astray: greatest(astray) }
+        std::array::from_fn(|lane| Steepest { rise: rise[lane], fall: fall[lane], astray: astray[lane] })
+    }
+}
+
+impl Steepest<f32> {
+    const NONE: Self = Self { rise: NO_EDGE, fall: NO_EDGE, astray: 0.0 };
+
+    #[inline(always)]
+    fn take_in(&mut self, other: Self) {
+        self.rise = self.rise.max(other.rise);
+        self.fall = self.fall.max(other.fall);
+        self.astray = self.astray.max(other.astray);
+    }
+
+    /// Slopes of planes, to where u or v grows and to where it shrinks, if those across are at most `most`.
+    fn with(self, most: f32) -> [f32; 2] {
+        [self.rise + most * self.astray, self.fall + most * self.astray]
     }
 }
 
 impl Measure {
-    /// The steepest of what was seen and of eight edges. An edge without length has slopes of zero.
+    /// The steepest of what was seen and of eight edges, but for those that are [`HIDDEN`]. An edge without length has slopes of zero.
     #[inline(always)]
-    fn steeper<K: Kernel>(self, k: K, edges: [K::F; 3], seen: Steepest<K::F>) -> Steepest<K::F> {
+    fn steeper<K: Kernel>(self, k: K, edges: [K::F; 3], hide: K::F, seen: Steepest<K::F>) -> Steepest<K::F> {
         let [x, y, z] = edges;
         let size = k.add(k.add(k.abs(x), k.abs(y)), k.abs(z));
         let [error, error_up] = [k.mul(size, k.splat(self.errors[0])), k.mul(size, k.splat(self.errors[1]))];
         let height = dot(k, edges, self.up);
         let way = k.max(k.sub(dot(k, edges, self.along), error), k.splat(TINY));
         let astray = k.add(k.abs(dot(k, edges, self.across)), error);
-        let more = k.add(error_up, k.mul(astray, k.splat(self.most)));
+        let per_way = k.div(k.splat(1.0), way);
+        let (slope, error) = (k.mul(height, per_way), k.sub(k.mul(error_up, per_way), hide));
         Steepest {
-            rise: k.max(k.div(k.add(height, more), way), seen.rise),
-            fall: k.max(k.div(k.sub(more, height), way), seen.fall),
-            astray: k.max(k.div(astray, way), seen.astray),
+            rise: k.max(k.add(error, slope), seen.rise),
+            fall: k.max(k.sub(error, slope), seen.fall),
+            astray: k.max(k.sub(k.mul(astray, per_way), hide), seen.astray),
+        }
+    }
+}
+
+/// Takes in all edges of a piece but those of cells at moved sides.
+#[inline(always)]
+fn measure<K: Kernel>(
+    k: K,
+    [by_u, by_v]: [Measure; 2],
+    piece: &PieceView<'_>,
+    [low, right, high, left]: [bool; 4],
+    slopes: &mut Slopes,
+) {
+    let (CellRect { i0, j0, .. }, [n_u, n_v]) = (piece.cells(), piece.cells().size());
+    // Columns of vertices: those at moved sides, and lanes beyond the last.
+    let first = usize::from(left);
+    let hide = |end: usize| -> [f32; 8] {
+        std::array::from_fn(|lane| if (first..end).contains(&lane) { 0.0 } else { HIDDEN })
+    };
+    let columns = n_u - usize::from(right);
+    let (hide_u, hide_low) = (k.load(&hide(columns)), k.load(&hide(columns + 1)));
+    // The ninth column, in the last lane of those that begin at the second.
+    let has_ninth = columns == MAX_CELLS;
+    let hide_high = k.load(&[HIDDEN, HIDDEN, HIDDEN, HIDDEN, HIDDEN, HIDDEN, HIDDEN, 0.0]);
+    let (begin, end) = (usize::from(low), n_v - usize::from(high));
+    let mut of_u = Steepest::none(k);
+    let mut row = Row::of(k, piece, begin.min(n_v));
+    for j in begin..=end {
+        of_u = by_u.steeper(k, edges(k, row.low, row.high), hide_u, of_u);
+        if j == end {
+            break;
+        }
+        let next = Row::of(k, piece, j + 1);
+        let mut of_v = by_v.steeper(k, edges(k, row.low, next.low), hide_low, Steepest::none(k));
+        if has_ninth {
+            of_v = by_v.steeper(k, edges(k, row.high, next.high), hide_high, of_v);
+        }
+        let mut of_row = Steepest::NONE;
+        of_v.lanes(k).into_iter().for_each(|lane| of_row.take_in(lane));
+        slopes.add(1, usize::from(j0) + j, of_row);
+        row = next;
+    }
+    of_u.lanes(k)[..n_u].iter().enumerate().for_each(|(lane, seen)| slopes.add(0, usize::from(i0) + lane, *seen));
+}
+
+/// Triangles at a moved side of a piece, by their derivatives along u and v.
+#[derive(Default)]
+struct Strip {
+    /// x, y and z along u, and along v.
+    derivatives: [[[f32; 8]; 3]; 2],
+    cells: [[usize; 2]; 8],
+    n: usize,
+}
+
+/// A vertex: where it lies in u and v, in cells, and in the lattice.
+type Corner = (DVec2, DVec3);
+
+impl Strip {
+    /// Those of all pieces of a patch. `None` if a triangle lies the wrong way round.
+    fn of_pieces<'a>(pieces: impl Iterator<Item = PieceView<'a>>, borders: &Borders) -> Option<Vec<Self>> {
+        let mut strips = Vec::new();
+        for piece in pieces {
+            let sides = borders.moved_sides(piece.cells());
+            for side in (0..4).filter(|&side| sides[side]) {
+                strips.extend(Self::at_side(&piece, side, borders)?);
+            }
+        }
+        Some(strips)
+    }
+
+    /// The two triangles of each cell.
+    fn at_side(piece: &PieceView<'_>, side: usize, borders: &Borders) -> Option<[Self; 2]> {
+        let (CellRect { i0, j0, .. }, [n_u, n_v]) = (piece.cells(), piece.cells().size());
+        let corner = |[i, j]: [usize; 2]| {
+            let place = borders.place([usize::from(i0) + i, usize::from(j0) + j]);
+            (place, IVec3::from_array(piece.vertex(i, j)).as_dvec3())
+        };
+        let (is_along_u, n) = (side == 0 || side == 2, [n_u, n_v][side % 2]);
+        let cell = |along: usize| match side {
+            0 => [along, 0],
+            1 => [n_u - 1, along],
+            2 => [along, n_v - 1],
+            _ => [0, along],
+        };
+        let ends = |along: usize| {
+            let [i, j] = cell(along);
+            [corner([i, j]), corner(if is_along_u { [i, j + 1] } else { [i + 1, j] })]
+        };
+        let mut strips = [Self::default(), Self::default()];
+        let mut last = ends(0);
+        for along in 0..n {
+            let next = ends(along + 1);
+            let ([a, d], c) = if is_along_u { (last, next[1]) } else { ([last[0], next[0]], next[1]) };
+            let b = if is_along_u { next[0] } else { last[1] };
+            let [i, j] = cell(along);
+            let cell = [usize::from(i0) + i, usize::from(j0) + j];
+            strips[0].add(cell, [a, b, d])?;
+            strips[1].add(cell, [c, d, b])?;
+            last = next;
+        }
+        Some(strips)
+    }
+
+    /// Adds a triangle of a cell, unless it has no area in u and v, as where vertices have moved to one place.
+    fn add(&mut self, cell: [usize; 2], [(at_a, a), (at_b, b), (at_c, c)]: [Corner; 3]) -> Option<()> {
+        if at_a == at_b || at_a == at_c || at_b == at_c {
+            return Some(());
+        }
+        let (to_b, to_c, b, c) = (at_b - at_a, at_c - at_a, b - a, c - a);
+        // A tenth of a cell's: what is flatter than that, rounding may have turned.
+        if to_b.perp_dot(to_c) < 0.1 {
+            return None;
+        }
+        let derivatives = [b * to_c.y - c * to_b.y, c * to_b.x - b * to_c.x];
+        for (lanes, derivative) in self.derivatives.iter_mut().zip(derivatives) {
+            let [x, y, z] = derivative.as_vec3().to_array();
+            (lanes[0][self.n], lanes[1][self.n], lanes[2][self.n]) = (x, y, z);
+        }
+        self.cells[self.n] = cell;
+        self.n += 1;
+        Some(())
+    }
+
+    #[inline(always)]
+    fn measure<K: Kernel>(&self, k: K, by: [Measure; 2], slopes: &mut Slopes) {
+        let hide = k.load(&std::array::from_fn(|lane| if lane < self.n { 0.0 } else { HIDDEN }));
+        for axis in [0, 1] {
+            let [x, y, z] = &self.derivatives[axis];
+            let steepest = by[axis].steeper(k, [k.load(x), k.load(y), k.load(z)], hide, Steepest::none(k));
+            for (seen, cell) in steepest.lanes(k).into_iter().zip(&self.cells[..self.n]) {
+                slopes.add(axis, cell[axis], seen);
+            }
         }
     }
 }
@@ -498,15 +675,28 @@ impl<K: Kernel> Row<K> {
     /// The same, number by number, of a row with fewer vertices.
     #[inline(always)]
     fn of_few<const BYTES: usize>(k: K, piece: &PieceView<'_>, j: usize) -> Self {
-        let (last, base) = (piece.columns() - 1, piece.head.base);
-        let vertices: [[i32; 3]; MOST_COLUMNS] = std::array::from_fn(|i| piece.read::<BYTES>(i.min(last), j));
-        let of = |axis: usize| vertices.map(|vertex| (vertex[axis] - base[axis]) as f32);
-        let [x, y, z] = &[of(0), of(1), of(2)];
+        let [x, y, z] = [0, 1, 2].map(|axis| few::<BYTES>(piece, j, axis));
         Self {
-            low: [k.load(eight(x, 0)), k.load(eight(y, 0)), k.load(eight(z, 0))],
-            high: [k.load(eight(x, 1)), k.load(eight(y, 1)), k.load(eight(z, 1))],
+            low: [k.load(eight(&x, 0)), k.load(eight(&y, 0)), k.load(eight(&z, 0))],
+            high: [k.load(eight(&x, 1)), k.load(eight(&y, 1)), k.load(eight(&z, 1))],
         }
     }
+}
+
+/// One coordinate of a row's vertices, and of the last one where it has fewer than nine.
+#[inline(always)]
+fn few<const BYTES: usize>(piece: &PieceView<'_>, j: usize, axis: usize) -> [f32; MOST_COLUMNS] {
+    let bytes = &piece.bytes[piece.row_start(j, axis)..][..BYTES * piece.columns()];
+    let (mut row, mut last) = ([0.0; MOST_COLUMNS], 0.0);
+    let mut numbers = bytes.chunks_exact(BYTES);
+    for x in &mut row {
+        if let Some(number) = numbers.next() {
+            let third = if BYTES == 3 { number[2] } else { 0 };
+            last = u32::from_le_bytes([number[0], number[1], third, 0]) as f32;
+        }
+        *x = last;
+    }
+    row
 }
 
 #[inline(always)]

@@ -35,8 +35,8 @@ mod ray;
 mod triangles;
 
 pub use boxes::{CellRect, HEAD_BYTES, LaneHits, lane_mask};
-pub use horizon::Horizon;
 pub use hit::{LatticeHit, TriangleId};
+pub use horizon::{Borders, Horizon};
 pub use node::{NODE_BYTES, NodeView, encode_node, is_node};
 pub use piece::{MAX_CELLS, MOST_PIECE_BYTES, PieceLayout, PieceView, VertexFormat};
 pub use ray::{LATTICE_LIMIT, LatticeRay, Plane};

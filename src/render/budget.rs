@@ -19,9 +19,9 @@ use crate::cache::SegmentCache;
 use crate::error::{Error, ErrorKind, Result};
 use std::fmt;
 
-/// Bytes that a worker may touch besides the cache: its stack, the scratch for blocks that are used once, evaluators,
+/// Bytes that a worker may touch besides the cache: its stack, the scratch for blocks that are used once, evaluators, the pieces of a patch that is left,
 /// a tile of pixels, and what the allocator keeps for it.
-pub const WORKER_BYTES: usize = SegmentCache::SCRATCH_BYTES + (512 << 10);
+pub const WORKER_BYTES: usize = SegmentCache::SCRATCH_BYTES + (768 << 10);
 
 /// Bytes for everything too small to be counted: progress bar, statistics, code that was not run yet.
 const ODDS_AND_ENDS: u64 = 2 << 20;

@@ -4,11 +4,11 @@ use super::costs::BuildCosts;
 use super::world::{GridCache, WorldMesh};
 use crate::cache::{Block, BlockLayout, Claim, Recorder, Slot, SlotId, Visit};
 use crate::grid::{
-    CellRect, MAX_CELLS, MOST_PIECE_BYTES, NODE_BYTES, NodeView, PieceLayout, PieceView, encode_node, is_node,
+    Borders, CellRect, MAX_CELLS, MOST_PIECE_BYTES, NODE_BYTES, NodeView, PieceLayout, PieceView, encode_node, is_node,
 };
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Bounds, LatticeGrid};
-use crate::subdiv::{Dicer, PatchRates};
+use crate::subdiv::{Dicer, PatchRates, snapped};
 
 /// Children of a node along u and v.
 pub(super) const NODE_SIDE: u32 = 4;
@@ -19,14 +19,14 @@ const CHILD_BOX_DEPTH: u32 = 3;
 /// Patches whose rates a builder remembers.
 const N_RATES: usize = 16;
 
-/// Room for the pieces of a node.
+/// Room for the pieces of a patch.
 #[derive(Default)]
 pub(super) struct PieceRoom(Vec<u64>);
 
 impl PieceRoom {
-    /// Places for one piece each.
-    pub fn places(&mut self) -> impl Iterator<Item = &mut [u8]> {
-        self.0.resize((NODE_SIDE * NODE_SIDE) as usize * MOST_PIECE_BYTES / size_of::<u64>(), 0);
+    /// Places for so many pieces.
+    pub fn places(&mut self, n: usize) -> impl Iterator<Item = &mut [u8]> {
+        self.0.resize(n * MOST_PIECE_BYTES / size_of::<u64>(), 0);
         bytemuck::cast_slice_mut(&mut self.0).chunks_exact_mut(MOST_PIECE_BYTES)
     }
 }
@@ -146,6 +146,17 @@ impl<'w> Builder<'w> {
     /// The cells of a patch.
     pub fn cells_of(&mut self, of: PatchContext<'_>) -> CellRect {
         all_cells(&self.rates(of))
+    }
+
+    /// Where the vertices of a patch lie.
+    pub fn borders_of(&mut self, of: PatchContext<'_>) -> Borders {
+        let rates = self.rates(of);
+        let moved = [0, 1, 2, 3].map(|side| {
+            let (n, rate) = ([rates.n_u, rates.n_v][side % 2], rates.sides[side]);
+            let place = |i: u32| f64::from(snapped(i, n, rate) * n) / f64::from(rate);
+            if rate == n { Vec::new() } else { (0..=n).map(place).collect() }
+        });
+        Borders { cells: all_cells(&rates), moved }
     }
 
     /// How finely a patch is diced: the same for its node and all its pieces.

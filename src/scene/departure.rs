@@ -13,14 +13,15 @@ use crate::ids::{MeshId, PatchId};
 use crate::math::Ray;
 use crate::math::simd::{self, Kernel};
 
-/// Patches that are remembered at most: 512 KiB.
+/// Patches that are remembered at most: 512 KiB. With half of them, secondary rays on trex (11,070 patches) were 3 to 5 % slower.
 const MOST_PATCHES: usize = 1 << 14;
 
-/// Children of a node.
-const MOST_CHILDREN: usize = (NODE_SIDE * NODE_SIDE) as usize;
+/// Pieces of a patch whose horizon is found at most. With 64 instead, ambient occlusion of bigguy and monsterfrog at 1920x1080 and one cell a pixel
+/// took 1.14 and 1.09 times as long.
+const MOST_PIECES: usize = 256;
 
-/// Rays that leave a patch, for each of its pieces, before its horizon is found. Renders by pixel groups send few: with the second ray of a block
-/// they took 2.9 to 6.4 % more instructions than without. With 32, rays at a rate of 32, 16 pieces a patch, gained less.
+/// Rays that leave a patch, for each of its pieces, before its horizon is found. Renders by pixel groups send few: trex at 960x540 took 0.2 % more
+/// instructions with 16 than with 8, and as many at 1920x1080 with 4 as with 8.
 const RAYS_PER_PIECE: u32 = 8;
 
 /// The horizons of patches that rays have left, for all threads.
@@ -106,7 +107,7 @@ impl Departures {
     #[inline(never)]
     fn ask(&self, ray: &LatticeRay, left: &mut Left<'_, '_, '_, '_>) -> bool {
         let number = self.number(left.of.id, left.of.patch);
-        if !self.horizons.is_due(number, ray.is_one_in_eight(), || RAYS_PER_PIECE * left.n_pieces()) {
+        if !self.horizons.is_due(number, ray.is_one_in_eight(), || RAYS_PER_PIECE * left.n_pieces() as u32) {
             return false;
         }
         let horizon = left.horizon(ray);
@@ -140,48 +141,55 @@ impl<'v> Left<'_, 'v, '_, '_> {
     }
 
     /// Pieces of the patch.
-    fn n_pieces(&mut self) -> u32 {
-        self.cells().size().map(|n| n.div_ceil(MAX_CELLS) as u32).iter().product()
+    fn n_pieces(&mut self) -> usize {
+        self.cells().size().map(|n| n.div_ceil(MAX_CELLS)).iter().product()
     }
 
-    /// The patch's horizon on the side to which the ray leaves it; none if there are nodes below its first.
+    /// The patch's horizon on the side to which the ray leaves it; none if it has too many pieces.
     fn horizon(&mut self, ray: &LatticeRay) -> Horizon {
-        let cells = self.cells();
+        let n_pieces = self.n_pieces();
+        if n_pieces > MOST_PIECES || self.of.mesh.surface().edited().has_holes() {
+            return Horizon::NONE;
+        }
+        let (cells, borders) = (self.cells(), self.builder.borders_of(self.of));
         let mut room = std::mem::take(&mut self.builder.pieces);
-        let horizon = self.horizon_over(ray, cells, room.places());
+        let mut pieces = Pieces { of: self.of, visit: self.visit, found: Vec::with_capacity(n_pieces) };
+        pieces.collect(self.visit.peek(self.root), cells, self.builder, &mut room.places(n_pieces));
+        let horizon = Horizon::of_pieces(pieces.found.into_iter(), &borders, ray);
         self.builder.pieces = room;
         horizon
     }
+}
 
-    fn horizon_over<'r>(
+/// All pieces of a patch, from the cache or not.
+struct Pieces<'r, 'a, 'p> {
+    of: PatchContext<'a>,
+    visit: &'r Visit<'p>,
+    found: Vec<PieceView<'r>>,
+}
+
+impl<'r> Pieces<'r, '_, '_> {
+    /// Collects the pieces over these cells; `block` is what is in the cache over them. Those that are not there are made in the places.
+    fn collect(
         &mut self,
-        ray: &LatticeRay,
+        block: Option<Block<'r>>,
         cells: CellRect,
-        mut places: impl Iterator<Item = &'r mut [u8]>,
-    ) -> Horizon
-    where
-        'v: 'r,
-    {
-        let Self { of, builder, visit, root } = self;
-        let mut piece = |block: Option<Block<'r>>, cells: CellRect| match block {
-            Some(block) => PieceView::new(block.bytes()),
-            None => builder.make_piece(*of, cells, places.next().expect("a place for each child of a node")),
-        };
-        let block = visit.peek(*root);
+        builder: &mut Builder<'_>,
+        places: &mut impl Iterator<Item = &'r mut [u8]>,
+    ) {
         if is_piece(cells) {
-            return Horizon::of_pieces(std::iter::once(piece(block, cells)), cells, ray);
+            let piece = match block {
+                Some(block) => PieceView::new(block.bytes()),
+                None => builder.make_piece(self.of, cells, places.next().expect("a place for each piece")),
+            };
+            self.found.push(piece);
+            return;
         }
         let side = child_side(cells);
-        if side as usize > MAX_CELLS || of.mesh.surface().edited().has_holes() {
-            return Horizon::NONE;
-        }
         let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
-        let mut pieces = [None; MOST_CHILDREN];
         for (b, a) in (0..n_v).flat_map(|b| (0..n_u).map(move |a| (b, a))) {
-            let lane = (NODE_SIDE * b + a) as usize;
-            let child = block.and_then(|block| visit.peek(block.child(lane)));
-            pieces[lane] = Some(piece(child, child_cells(cells, side, a, b)));
+            let child = block.and_then(|block| self.visit.peek(block.child((NODE_SIDE * b + a) as usize)));
+            self.collect(child, child_cells(cells, side, a, b), builder, places);
         }
-        Horizon::of_pieces(pieces.into_iter().flatten(), cells, ray)
     }
 }

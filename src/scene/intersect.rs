@@ -164,11 +164,7 @@ impl Leaves<'_, '_, '_, '_> {
                 // Apart, so that a block that is there stays in registers.
                 let block = builder.build_root(visit, of, cache, leaf.slot);
                 builder.note_root(of, leaf.slot, block);
-                kernel.enter(ClosestInPatch {
-                    builder,
-                    at: InPatch { visit, block, depth: 0, of, ray },
-                    hit,
-                });
+                kernel.enter(ClosestInPatch { builder, at: InPatch { visit, block, depth: 0, of, ray }, hit });
             }
         }
         hit.is_some().then(|| hit_of(mesh, id, ray.caller_t(hit.t), hit))

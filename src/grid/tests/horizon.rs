@@ -2,10 +2,10 @@
 
 use super::slow::{meet, triangles};
 use super::support::{Piece, Random, sheet, whole};
-use crate::grid::{CellRect, Horizon, LatticeRay, TriangleId};
+use crate::grid::{Borders, CellRect, Horizon, LatticeRay, TriangleId};
 use crate::ids::PatchId;
 use crate::math::simd::{self, Kernel, Portable, Task};
-use glam::{DVec3, IVec3};
+use glam::{DVec2, DVec3, IVec3};
 
 const PATCH: PatchId = PatchId(3);
 
@@ -37,7 +37,7 @@ fn from_somewhere(random: &mut Random, vertices: &[[i32; 3]], cells: CellRect) -
 }
 
 fn horizon_of(pieces: &[Piece], cells: CellRect, ray: &LatticeRay) -> Horizon {
-    Horizon::of_pieces(pieces.iter().map(Piece::view), cells, ray)
+    Horizon::of_pieces(pieces.iter().map(Piece::view), &Borders { cells, moved: Default::default() }, ray)
 }
 
 /// A horizon in f64.
@@ -57,9 +57,7 @@ impl Decoded {
         let vector = |at: usize| DVec3::from_array(std::array::from_fn(|k| f64::from(bytes[at + k]) - 128.0));
         let (u, v) = (vector(0), vector(4));
         let up = if bytes[3] >= 128 { v.cross(u) } else { u.cross(v) };
-        let rise = |axis: usize, way: usize, part: usize| {
-            f64::from(bytes[8 + 8 * axis + 4 * way + part].cast_signed())
-        };
+        let rise = |axis: usize, way: usize, part: usize| f64::from(bytes[8 + 8 * axis + 4 * way + part].cast_signed());
         let rises = [0, 1].map(|axis| [0, 1].map(|way| [0, 1, 2, 3].map(|part| rise(axis, way, part))));
         Self { ways: [u, v], up, parts_per_cell: [bytes[3] & 127, bytes[7]].map(|n| f64::from(n) / 64.0), rises }
     }
@@ -138,15 +136,15 @@ fn no_edge_is_forgotten() {
     }
 }
 
-/// A grid with sides of `n` cells, cut into pieces.
-fn pieces_of(vertices: &[[i32; 3]], n: usize) -> Vec<Piece> {
-    let starts = || (0..n).step_by(8).map(|i| (i, (i + 8).min(n)));
+/// A grid of `n_u` x `n_v` cells, cut into pieces.
+fn pieces_of(vertices: &[[i32; 3]], [n_u, n_v]: [usize; 2]) -> Vec<Piece> {
+    let starts = |n: usize| (0..n).step_by(8).map(move |i| (i, (i + 8).min(n)));
     let of = |(i0, i1): (usize, usize), (j0, j1): (usize, usize)| {
-        let places = (j0..=j1).flat_map(|j| (i0..=i1).map(move |i| j * (n + 1) + i));
+        let places = (j0..=j1).flat_map(|j| (i0..=i1).map(move |i| j * (n_u + 1) + i));
         let part: Vec<[i32; 3]> = places.map(|k| vertices[k]).collect();
         Piece::new(&part, CellRect { i0: i0 as u16, j0: j0 as u16, i1: i1 as u16, j1: j1 as u16 })
     };
-    starts().flat_map(|v| starts().map(move |u| of(u, v))).collect()
+    starts(n_v).flat_map(|v| starts(n_u).map(move |u| of(u, v))).collect()
 }
 
 #[test]
@@ -155,11 +153,59 @@ fn pieces_of_one_grid_have_a_horizon_together() {
     for (n, bend) in [(9, 1.0), (13, -1.0), (16, 3.0), (30, -3.0)] {
         let (vertices, cells) = (smooth(&mut random, n, n, 3000.0, 0.05, bend), whole(n as u16, n as u16));
         let ray = from_somewhere(&mut random, &vertices, cells);
-        let horizon = horizon_of(&pieces_of(&vertices, n), cells, &ray);
+        let horizon = horizon_of(&pieces_of(&vertices, [n, n]), cells, &ray);
         assert_ne!(horizon, Horizon::NONE, "a gentle sheet has a horizon");
         let highest = highest_chord(&mut random, &vertices, cells, horizon);
         assert!(-0.05 < highest && highest <= 0.0, "{n}: a chord of {highest}: {horizon:?}");
     }
+}
+
+/// A bent sheet whose sides have fewer segments than its grid: as patches have beside coarser ones.
+#[test]
+fn sides_with_fewer_segments_do_not_spoil_the_horizon() {
+    let mut random = Random(0xc0_4eb);
+    let [mut n_known, mut n_cleared] = [0, 0];
+    for round in 0..200 {
+        let n = [0, 1].map(|_| 1 + (random.unit() * 20.0) as u32);
+        let sides = [0, 1, 2, 3].map(|side| {
+            let n = n[side % 2];
+            if random.unit() < 0.3 { n } else { 1 + (random.unit() * f64::from(n)) as u32 }
+        });
+        let moved = [0, 1, 2, 3].map(|side| {
+            let (n, rate) = (n[side % 2], sides[side]);
+            let place = |k: u32| f64::from((2 * k * rate + n) / (2 * n) * n) / f64::from(rate);
+            if rate == n { Vec::new() } else { (0..=n).map(place).collect() }
+        });
+        let place = |[i, j]: [u32; 2]| {
+            let mut place = DVec2::new(f64::from(i), f64::from(j));
+            let sides = [(j == 0, 0), (i == n[0], 1), (j == n[1], 2), (i == 0, 3)];
+            for (_, side) in sides.into_iter().filter(|(is_there, side)| *is_there && !moved[*side].is_empty()) {
+                place[side % 2] = moved[side][[i, j][side % 2] as usize];
+            }
+            place
+        };
+        let (bend, twist) = (2.0 * random.unit() - 1.0, random.unit() - 0.5);
+        let [ridge, at_x, at_y] = [0, 1, 2].map(|_| random.unit() - 0.5);
+        let point = |at: DVec2| {
+            let [x, y] = [at.x / f64::from(n[0]) - 0.5, at.y / f64::from(n[1]) - 0.5];
+            let fold = ridge * ((x - at_x).clamp(0.0, 0.25) + (y - at_y).clamp(0.0, 0.25));
+            1e5 * DVec3::new(x + 0.2 * y, y, bend * x * x + twist * x * y + fold)
+        };
+        let of = |[i, j]: [u32; 2]| point(place([i, j])).round().as_ivec3().to_array();
+        let vertices: Vec<[i32; 3]> = (0..=n[1]).flat_map(|j| (0..=n[0]).map(move |i| [i, j])).map(of).collect();
+        let cells = whole(n[0] as u16, n[1] as u16);
+        let ray = from_somewhere(&mut random, &vertices, cells);
+        let pieces = pieces_of(&vertices, n.map(|n| n as usize));
+        let borders = Borders { cells, moved };
+        let horizon = Horizon::of_pieces(pieces.iter().map(Piece::view), &borders, &ray);
+        n_known += usize::from(horizon != Horizon::NONE);
+        let highest = highest_chord(&mut random, &vertices, cells, horizon);
+        assert!(highest <= 0.0, "round {round}, {n:?}, {sides:?}: a chord of {highest}: {horizon:?}");
+        let up = LatticeRay::new(DVec3::ZERO, DVec3::Z, f32::INFINITY, first());
+        n_cleared += usize::from(horizon.is_cleared_by(Portable, &up));
+    }
+    // Half of the horizons are those of the other side.
+    assert!(n_known > 150 && n_cleared > 60, "{n_known} horizons, {n_cleared} cleared");
 }
 
 #[test]
@@ -219,7 +265,7 @@ fn convex_surfaces_are_left_by_nearly_all_rays() {
     };
     let vertices: Vec<[i32; 3]> =
         (0..=16).flat_map(|j| (0..=16).map(move |i| at(i, j).round().as_ivec3().to_array())).collect();
-    let (pieces, cells) = (pieces_of(&vertices, 16), whole(16, 16));
+    let (pieces, cells) = (pieces_of(&vertices, [16, 16]), whole(16, 16));
     let mut random = Random(0xc0_4ea);
     let outwards = LatticeRay::new(at(0, 0), at(0, 0), f32::INFINITY, first());
     let horizon = horizon_of(&pieces, cells, &outwards);
@@ -234,6 +280,23 @@ fn convex_surfaces_are_left_by_nearly_all_rays() {
         horizon.is_cleared_by(Portable, &ray)
     });
     assert!(n_left.count() > 950);
+}
+
+/// A point above one wall of a ravine, along the wall's normal, may be behind the other wall.
+#[test]
+fn steep_ravines_are_not_left() {
+    for (slope, is_left) in [(0.5, true), (2.0, false)] {
+        let at = |i: i32, j: i32| [10_000 * i, 10_000 * j, (f64::from((i - 4).abs()) * 1e4 * slope) as i32];
+        let vertices: Vec<[i32; 3]> = (0..=8).flat_map(|j| (0..=8).map(move |i| at(i, j))).collect();
+        let (cells, from) = (whole(8, 8), TriangleId::new(PATCH, 2, 4, 0));
+        let [a, b, c] = triangles(&vertices, cells, PATCH).into_iter().find(|(id, _)| *id == from).unwrap().1;
+        let start = (a + b + c) / 3.0 + 6.5e4 * (b - a).cross(c - a).normalize();
+        let ray = LatticeRay::new(start, DVec3::new(-1.0, 0.0, 3.0), f32::INFINITY, from);
+        let horizon = horizon_of(&[Piece::new(&vertices, cells)], cells, &ray);
+        let meets = |(_, corners)| meet(&ray, corners).is_some_and(|m| m.t > 0.0 && m.inside > 0.0);
+        assert_eq!(triangles(&vertices, cells, PATCH).into_iter().any(meets), !is_left);
+        assert_eq!(horizon.is_cleared_by(Portable, &ray), is_left, "{slope}: {horizon:?}");
+    }
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Pieces and nodes against slow, obvious code.
 
 mod boxes;
-mod horizon;
 mod encoding;
+mod horizon;
 mod rays;
 mod slow;
 mod support;
