@@ -285,17 +285,17 @@ fn convex_surfaces_are_left_by_nearly_all_rays() {
 /// A point above one wall of a ravine, along the wall's normal, may be behind the other wall.
 #[test]
 fn steep_ravines_are_not_left() {
-    for (slope, is_left) in [(0.5, true), (2.0, false)] {
-        let at = |i: i32, j: i32| [10_000 * i, 10_000 * j, (f64::from((i - 4).abs()) * 1e4 * slope) as i32];
+    for (slope, up, is_left) in [(0.5, 1.0, true), (0.5, -1.0, true), (1.8, 1.0, false), (1.8, -1.0, false)] {
+        let at = |i: i32, j: i32| [10_000 * i, 10_000 * j, (f64::from((i - 4).abs()) * 1e4 * slope * up) as i32];
         let vertices: Vec<[i32; 3]> = (0..=8).flat_map(|j| (0..=8).map(move |i| at(i, j))).collect();
         let (cells, from) = (whole(8, 8), TriangleId::new(PATCH, 2, 4, 0));
         let [a, b, c] = triangles(&vertices, cells, PATCH).into_iter().find(|(id, _)| *id == from).unwrap().1;
-        let start = (a + b + c) / 3.0 + 6.5e4 * (b - a).cross(c - a).normalize();
-        let ray = LatticeRay::new(start, DVec3::new(-1.0, 0.0, 3.0), f32::INFINITY, from);
+        let start = (a + b + c) / 3.0 + 6e4 * up * (b - a).cross(c - a).normalize();
+        let ray = LatticeRay::new(start, DVec3::new(-1.0, 0.0, 3.0 * up), f32::INFINITY, from);
         let horizon = horizon_of(&[Piece::new(&vertices, cells)], cells, &ray);
         let meets = |(_, corners)| meet(&ray, corners).is_some_and(|m| m.t > 0.0 && m.inside > 0.0);
         assert_eq!(triangles(&vertices, cells, PATCH).into_iter().any(meets), !is_left);
-        assert_eq!(horizon.is_cleared_by(Portable, &ray), is_left, "{slope}: {horizon:?}");
+        assert_eq!(horizon.is_cleared_by(Portable, &ray), is_left, "{slope}, {up}: {horizon:?}");
     }
 }
 
