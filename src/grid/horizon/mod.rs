@@ -56,13 +56,16 @@ const PARTS: usize = 4;
 const PACKED: f32 = 63.0;
 
 /// The rise of what nobody clears.
-const NEVER: i8 = i8::MAX;
+const NEVER: i8 = i8::MAX - 1;
+
+/// This bit marks ravines.
+const RAVINE: i8 = 1;
 
 /// Products of slopes over |n| that are below minus this make ravines. (One would be enough, but for roundings.)
 const MOST_STEEP: f32 = 0.9375;
 
 /// Surfaces that are less steep have none, roundings included.
-const GENTLE: f32 = 0.9;
+const GENTLE: f32 = 0.85;
 
 /// One less K_u K_v, at least.
 const LEAST_SHARE: f32 = 0.05;
@@ -85,7 +88,8 @@ const NO_EDGE: f32 = f32::MIN;
 pub struct Horizon {
     /// For u and v: m_u or m_v, and 64 times the parts in a cell. The highest bit of the first of those is set if n is to be turned.
     frame: [[u8; 4]; 2],
-    /// Along u and v, where it grows and where it shrinks, from each part, in units of n over those of m_u or m_v.
+    /// Along u and v, where it grows and where it shrinks, from each part, in units of n over those of m_u or m_v; even numbers. The lowest bits, one after
+    /// the other, are set for parts (0, 0), (0, 1) and so on that are ravines.
     rises: [[[i8; PARTS]; 2]; 2],
 }
 
@@ -139,12 +143,20 @@ impl Horizon {
         let (ways, heights) = (sum_of_three(k, k.mul(m, d)), sum_of_three(k, k.mul(up, d)));
         let [i, j] = ray.start_cell();
         let signs = k.negative(ways);
-        let rise_u = rise(self.rises[0], signs & 1, part(i, parts_u));
-        let rise_v = rise(self.rises[1], signs >> 4 & 1, part(j, parts_v));
+        let (u, v) = (part(i, parts_u), part(j, parts_v));
+        let (rise_u, rise_v) = (rise(self.rises[0], signs & 1, u), rise(self.rises[1], signs >> 4 & 1, v));
         let (ways, heights) = (k.store(k.abs(ways)), k.store(heights));
         let height = if parts_u & IS_TURNED != 0 { heights[4] } else { heights[0] };
         rise_u.max(rise_v) < NEVER
+            && !self.is_ravine(u, v)
             && height > f32::from(rise_u) * ways[0] + f32::from(rise_v) * ways[4] + MARGIN_IN_HEIGHT
+    }
+
+    /// Whether nobody leaves from part (u, v).
+    #[inline(always)]
+    fn is_ravine(self, u: u32, v: u32) -> bool {
+        let rises = if u < 2 { self.rises[0] } else { self.rises[1] };
+        byte(rises, PARTS as u32 * (u % 2) + v) & RAVINE != 0
     }
 }
 
@@ -157,9 +169,14 @@ fn sum_of_three<K: Kernel>(k: K, x: K::F) -> K::F {
 /// What a way along u or v brings at most, where it grows (0) or shrinks (1).
 #[inline(always)]
 fn rise(rises: [[i8; PARTS]; 2], way: u32, part: u32) -> i8 {
-    // Not by index: that would wait for the words to be stored.
+    byte(rises, PARTS as u32 * way + part) & !RAVINE
+}
+
+/// Not by index: that would wait for the words to be stored.
+#[inline(always)]
+fn byte(rises: [[i8; PARTS]; 2], k: u32) -> i8 {
     let all: u64 = bytemuck::cast(rises);
-    (all.to_le() >> (8 * (PARTS as u32 * way + part))) as i8
+    (all.to_le() >> (8 * k)) as i8
 }
 
 /// 64 times the parts in one of `n` cells, so that no cell is in a fifth part.
@@ -294,7 +311,7 @@ impl Slopes {
         let [to_more, to_less] = &mut ahead;
         (1..PARTS).for_each(|part| to_less[part] = to_less[part].max(to_less[part - 1]));
         (1..PARTS).rev().for_each(|part| to_more[part - 1] = to_more[part - 1].max(to_more[part]));
-        Planes { parts, own, rises: ahead.map(|way| way.map(rounded_up)) }
+        Planes { parts, own, ahead }
     }
 }
 
@@ -304,7 +321,7 @@ struct Planes {
     /// Of those in each part.
     own: [[f32; PARTS]; 2],
     /// Of those that are ahead of each part.
-    rises: [[i8; PARTS]; 2],
+    ahead: [[f32; PARTS]; 2],
 }
 
 impl Frame {
@@ -337,10 +354,13 @@ impl Frame {
     /// The horizon of a surface with these slopes; [`NONE`](Horizon::NONE) if it is too steep.
     fn horizon(&self, slopes: &Slopes) -> Horizon {
         let Some(most) = slopes.bounds() else { return Horizon::NONE };
-        let mut planes = [slopes.planes(0, most[1]), slopes.planes(1, most[0])];
+        let planes = [slopes.planes(0, most[1]), slopes.planes(1, most[0])];
+        let mut rises = planes.each_ref().map(|planes| planes.ahead.map(|way| way.map(rounded_up)));
         let steepness = most[0] * self.along[0].length() + most[1] * self.along[1].length();
         if steepness > GENTLE * self.up.length() {
-            self.close_ravines(&mut planes);
+            let bits = rises.as_flattened_mut().as_flattened_mut().iter_mut();
+            let parts = (0..PARTS).flat_map(|u| (0..PARTS).map(move |v| [u, v]));
+            bits.zip(parts).filter(|(_, part)| self.is_ravine(&planes, *part)).for_each(|(bit, _)| *bit |= RAVINE);
         }
         let frame_of = |axis: usize| {
             let [x, y, z] = self.packed[axis].map(|x: i8| x.cast_unsigned().wrapping_add(BIAS));
@@ -348,29 +368,19 @@ impl Frame {
         };
         let mut frame = [frame_of(0), frame_of(1)];
         frame[0][3] |= if slopes.is_turned { IS_TURNED } else { 0 };
-        Horizon { frame, rises: [planes[0].rises, planes[1].rises] }
-    }
-
-    /// Lets nobody leave from parts where a triangle's normal may be below a plane.
-    fn close_ravines(&self, planes: &mut [Planes; 2]) {
-        for (u, v) in (0..PARTS).flat_map(|v| (0..PARTS).map(move |u| (u, v))) {
-            if self.is_ravine(planes, [u, v]) {
-                let most = |axis: usize, part: usize| planes[axis].rises.iter().map(|way| way[part]).max();
-                let (axis, part) = if most(0, u) > most(1, v) { (0, u) } else { (1, v) };
-                planes[axis].rises.iter_mut().for_each(|way| way[part] = NEVER);
-            }
-        }
+        Horizon { frame, rises }
     }
 
     /// Whether the normal of a triangle in this part of the patch may be below one of the planes of chords from there.
     fn is_ravine(&self, planes: &[Planes; 2], parts: [usize; 2]) -> bool {
-        let rises = [0, 1].map(|axis| planes[axis].rises.map(|way| way[parts[axis]]));
+        // Rounded up by two at most.
+        let ahead = [0, 1].map(|axis| planes[axis].ahead.map(|way| way[parts[axis]] + 2.0));
         let own = [0, 1].map(|axis| planes[axis].own.map(|way| way[parts[axis]]));
-        if rises.as_flattened().contains(&NEVER) || own.as_flattened().contains(&NO_EDGE) {
+        if own.as_flattened().contains(&NO_EDGE) {
             return false;
         }
         let least = -MOST_STEEP * self.up.length_squared();
-        let (planes, triangles) = (self.corners(rises.map(|r| r.map(f32::from))), self.corners(own));
+        let (planes, triangles) = (self.corners(ahead), self.corners(own));
         planes.iter().any(|plane| triangles.iter().any(|triangle| plane.dot(*triangle) < least))
     }
 
@@ -381,8 +391,7 @@ impl Frame {
     }
 }
 
-/// A rise as a number of units, with some margin.
+/// A rise as an even number of units, with some margin; [`NEVER`] if it is too great.
 fn rounded_up(rise: f32) -> i8 {
-    // Saturates.
-    (rise + MARGIN * rise.abs()).ceil() as i8
+    2 * (((rise + MARGIN * rise.abs()) / 2.0).ceil() as i8).clamp(i8::MIN / 2, NEVER / 2)
 }

@@ -46,27 +46,41 @@ struct Decoded {
     up: DVec3,
     parts_per_cell: [f64; 2],
     rises: [[[f64; 4]; 2]; 2],
+    /// By 4 u + v.
+    is_ravine: [bool; 16],
 }
 
 /// What nobody clears.
-const NEVER: f64 = 127.0;
+const NEVER: f64 = 126.0;
 
 impl Decoded {
     fn new(horizon: Horizon) -> Self {
         let bytes: Vec<u8> = horizon.to_words().into_iter().flat_map(u64::to_ne_bytes).collect();
         let vector = |at: usize| DVec3::from_array(std::array::from_fn(|k| f64::from(bytes[at + k]) - 128.0));
         let (u, v) = (vector(0), vector(4));
+        let is_ravine = std::array::from_fn(|k| bytes[8 + k] & 1 != 0);
         let up = if bytes[3] >= 128 { v.cross(u) } else { u.cross(v) };
-        let rise = |axis: usize, way: usize, part: usize| f64::from(bytes[8 + 8 * axis + 4 * way + part].cast_signed());
+        let rise =
+            |axis: usize, way: usize, part: usize| f64::from(bytes[8 + 8 * axis + 4 * way + part].cast_signed() & !1);
         let rises = [0, 1].map(|axis| [0, 1].map(|way| [0, 1, 2, 3].map(|part| rise(axis, way, part))));
-        Self { ways: [u, v], up, parts_per_cell: [bytes[3] & 127, bytes[7]].map(|n| f64::from(n) / 64.0), rises }
+        Self {
+            ways: [u, v],
+            up,
+            parts_per_cell: [bytes[3] & 127, bytes[7]].map(|n| f64::from(n) / 64.0),
+            rises,
+            is_ravine,
+        }
     }
 
     /// How high the line along `way` is over the horizon from a cell, in the length of the way; `None` if nobody clears it.
     fn height(&self, cell: [u32; 2], way: DVec3) -> Option<f64> {
         let mut height = self.up.dot(way);
-        for (axis, cell) in cell.into_iter().enumerate() {
-            let part = (f64::from(cell) * self.parts_per_cell[axis]) as usize;
+        let part = |axis: usize| (f64::from(cell[axis]) * self.parts_per_cell[axis]) as usize;
+        if self.is_ravine[4 * part(0) + part(1)] {
+            return None;
+        }
+        for axis in 0..2 {
+            let part = part(axis);
             let along = self.ways[axis].dot(way);
             let rise = self.rises[axis][usize::from(along < 0.0)][part];
             if rise == NEVER {
@@ -297,6 +311,24 @@ fn steep_ravines_are_not_left() {
         assert_eq!(triangles(&vertices, cells, PATCH).into_iter().any(meets), !is_left);
         assert_eq!(horizon.is_cleared_by(Portable, &ray), is_left, "{slope}, {up}: {horizon:?}");
     }
+}
+
+/// The same where the other wall is so steep that nobody clears it, while the way to this side is free.
+#[test]
+fn ravines_with_one_wall_too_steep_to_clear_are_not_left() {
+    let at = |i: i32, j: i32| match i {
+        0..=4 => [10_000 * i, 10_000 * j, 10_000 * (4 - i)],
+        _ => [40_000 + 2_500 * (i - 4), 10_000 * j, 10_000 * (i - 4)],
+    };
+    let vertices: Vec<[i32; 3]> = (0..=8).flat_map(|j| (0..=8).map(move |i| at(i, j))).collect();
+    let (cells, from) = (whole(8, 8), TriangleId::new(PATCH, 3, 4, 0));
+    let [a, b, c] = triangles(&vertices, cells, PATCH).into_iter().find(|(id, _)| *id == from).unwrap().1;
+    let start = (a + b + c) / 3.0 + 1.7e4 * (b - a).cross(c - a).normalize();
+    let ray = LatticeRay::new(start, DVec3::new(-1.0, 0.0, 1.5), f32::INFINITY, from);
+    let horizon = horizon_of(&[Piece::new(&vertices, cells)], cells, &ray);
+    let meets = |(_, corners)| meet(&ray, corners).is_some_and(|m| m.t > 0.0 && m.inside > 0.0);
+    assert!(triangles(&vertices, cells, PATCH).into_iter().any(meets));
+    assert!(!horizon.is_cleared_by(Portable, &ray), "{horizon:?}");
 }
 
 #[test]
