@@ -10,8 +10,8 @@ use glam::Vec3;
 /// Vertices in a row of the widest piece.
 const MOST_COLUMNS: usize = MAX_CELLS + 1;
 
-/// The least lattice distance that counts as one when a slope is found.
-const TINY: f32 = 1e-30;
+/// The least way, in steps times the greatest component of a packed vector: heights over it, of 2^40 at most, are less than [`HIDDEN`].
+const TINY: f32 = 1e-12;
 
 /// This is taken from the slopes of edges that do not count.
 pub(super) const HIDDEN: f32 = 1e30;
