@@ -24,7 +24,7 @@
 //! 4. Every kernel gives the same bits.
 //! 5. Of two hits at equal t the smaller [`TriangleId`] wins, so the order of tests does not matter.
 //!
-//! Read [`ray`](LatticeRay), then `boxes.rs`, `piece.rs`, `triangles.rs`; `horizon.rs` spares rays the surface that they leave.
+//! Read [`ray`](LatticeRay), then `boxes.rs`, `piece.rs`, `triangles.rs`; `horizon/` spares rays the surface that they leave.
 
 mod boxes;
 mod hit;

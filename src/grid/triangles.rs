@@ -90,7 +90,7 @@ impl PieceView<'_> {
 
     /// The corners of a triangle of this piece.
     #[inline(always)]
-    fn corners(&self, triangle: TriangleId) -> [IVec3; 3] {
+    pub(super) fn corners(&self, triangle: TriangleId) -> [IVec3; 3] {
         let i = (triangle.i() - u32::from(self.head.cells.i0)) as usize;
         let j = (triangle.j() - u32::from(self.head.cells.j0)) as usize;
         match (self.head.format, triangle.half() as usize) {

@@ -24,9 +24,12 @@ const N_RATES: usize = 16;
 pub(super) struct PieceRoom(Vec<u64>);
 
 impl PieceRoom {
-    /// Places for so many pieces.
+    /// Places for so many pieces at least.
     pub fn places(&mut self, n: usize) -> impl Iterator<Item = &mut [u8]> {
-        self.0.resize(n * MOST_PIECE_BYTES / size_of::<u64>(), 0);
+        let words = n * MOST_PIECE_BYTES / size_of::<u64>();
+        if self.0.len() < words {
+            self.0.resize(words, 0);
+        }
         bytemuck::cast_slice_mut(&mut self.0).chunks_exact_mut(MOST_PIECE_BYTES)
     }
 }

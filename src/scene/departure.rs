@@ -35,9 +35,9 @@ pub(super) struct Departures {
 /// What is known of the patch that a ray leaves.
 #[derive(Clone, Copy)]
 pub(super) struct Leaving<'c> {
-    /// The patch that it starts on, unless it has to be tested against it.
+    /// The patch that it starts on, unless it is known that it has to be tested against it.
     patch: PatchId,
-    /// Who is to be asked whether it has. `None`: it has not.
+    /// Who is to be asked whether it has left that patch; `None` if it has.
     unknown: Option<&'c Departures>,
 }
 

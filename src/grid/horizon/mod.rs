@@ -196,12 +196,7 @@ fn leaves_below(piece: &PieceView<'_>, ray: &LatticeRay) -> bool {
     if !(u32::from(i0)..u32::from(i1)).contains(&i) || !(u32::from(j0)..u32::from(j1)).contains(&j) {
         return false;
     }
-    let (i, j) = ((i - u32::from(i0)) as usize, (j - u32::from(j0)) as usize);
-    let at = |i, j| IVec3::from_array(piece.vertex(i, j)).as_dvec3();
-    let [a, b, c] = match ray.skip.half() {
-        0 => [at(i, j), at(i + 1, j), at(i, j + 1)],
-        _ => [at(i + 1, j + 1), at(i, j + 1), at(i + 1, j)],
-    };
+    let [a, b, c] = piece.corners(ray.skip).map(|corner| corner.as_dvec3());
     (b - a).cross(c - a).dot(ray.direction()) < 0.0
 }
 
@@ -237,9 +232,7 @@ impl<'a, I: Iterator<Item = PieceView<'a>> + Clone> Task for OfPieces<'_, I> {
 
 /// What a grid's edges are measured by.
 struct Frame {
-    /// m_u and m_v as they are packed.
-    packed: [[i8; 3]; 2],
-    /// The same.
+    /// m_u and m_v, as they are packed: whole numbers.
     along: [Vec3; 2],
     /// Their cross product, without error.
     up: Vec3,
@@ -339,10 +332,8 @@ impl Frame {
         let (of_u, of_v) = (of_u.try_normalize()?, of_v.try_normalize()?);
         let normal = of_u.cross(of_v).try_normalize()?;
         // Each at a right angle to the other's edges.
-        let packed = [of_v.cross(normal), normal.cross(of_u)]
-            .map(|m| (m * (PACKED / m.abs().max_element())).round().to_array().map(|x| x as i8));
-        let along = packed.map(|m| Vec3::from_array(m.map(f32::from)));
-        Some(Self { packed, along, up: along[0].cross(along[1]) })
+        let along = [of_v.cross(normal), normal.cross(of_u)].map(|m| (m * (PACKED / m.abs().max_element())).round());
+        Some(Self { along, up: along[0].cross(along[1]) })
     }
 
     fn measure_of(&self, axis: usize) -> Measure {
@@ -363,7 +354,7 @@ impl Frame {
             bits.zip(parts).filter(|(_, part)| self.is_ravine(&planes, *part)).for_each(|(bit, _)| *bit |= RAVINE);
         }
         let frame_of = |axis: usize| {
-            let [x, y, z] = self.packed[axis].map(|x: i8| x.cast_unsigned().wrapping_add(BIAS));
+            let [x, y, z] = (self.along[axis] + f32::from(BIAS)).to_array().map(|x| x as u8);
             [x, y, z, planes[axis].parts]
         };
         let mut frame = [frame_of(0), frame_of(1)];
@@ -373,7 +364,7 @@ impl Frame {
 
     /// Whether the normal of a triangle in this part of the patch may be below one of the planes of chords from there.
     fn is_ravine(&self, planes: &[Planes; 2], parts: [usize; 2]) -> bool {
-        // Rounded up by two at most.
+        // Rounded up by two at most, and by a margin that `MOST_STEEP` leaves room for.
         let ahead = [0, 1].map(|axis| planes[axis].ahead.map(|way| way[parts[axis]] + 2.0));
         let own = [0, 1].map(|axis| planes[axis].own.map(|way| way[parts[axis]]));
         if own.as_flattened().contains(&NO_EDGE) {
