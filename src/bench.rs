@@ -48,12 +48,14 @@ impl BenchRay {
 struct SecondaryRay {
     ray: BenchRay,
     from: Option<PrimitiveRef>,
+    /// How far above it.
+    above: f32,
 }
 
 impl SecondaryRay {
     #[inline]
     fn ray(&self) -> Ray {
-        Ray { from: self.from, is_above: self.from.is_some(), ..self.ray.ray() }
+        Ray { from: self.from, above: self.from.map(|_| self.above), ..self.ray.ray() }
     }
 }
 
@@ -339,7 +341,7 @@ impl Bench {
             let from = self.settings.tells_start.then(|| tracer.closest(&ray.ray())).flatten().map(|hit| hit.primitive);
             let along = |sample: u32| {
                 let direction = cosine_direction(normal, uniform(pixel, 2 * sample), uniform(pixel, 2 * sample + 1));
-                SecondaryRay { ray: BenchRay { origin, direction }, from }
+                SecondaryRay { ray: BenchRay { origin, direction }, from, above: 1.01 * offset }
             };
             ao.extend((0..n_ao).map(along));
             diffuse.push(along(self.settings.ao));

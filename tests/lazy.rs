@@ -151,7 +151,7 @@ fn rays_said_to_start_above_a_surface_answer_as_if_they_were_not() {
                 let rays: Vec<Ray> = (0..30).map(|_| random.ray(bounds)).collect();
                 for ray in rays.iter().chain(&rays) {
                     for ray in leaving(ray, &mut plain, &mut random) {
-                        let blind = Ray { is_above: false, ..ray };
+                        let blind = Ray { above: None, ..ray };
                         let wanted = plain.closest(&blind);
                         for tracer in [&mut told, &mut small] {
                             let hit = tracer.closest(&ray);
@@ -171,6 +171,58 @@ fn rays_said_to_start_above_a_surface_answer_as_if_they_were_not() {
 }
 
 #[test]
+fn most_rays_of_many_that_leave_a_patch_need_no_walk() {
+    let mut random = Random(0x5c1_11e5);
+    let (mut n_left, mut n_all) = (0, 0);
+    let meshes = [
+        ("sphere", shapes::cube_sphere(10)),
+        ("globe", shapes::globe(24, 12)),
+        ("torus", shapes::torus(32, 16, 1.0, 0.4)),
+        ("plane", shapes::plane(9, 7)),
+    ];
+    for (name, mesh) in meshes {
+        for rate in [DicingRate::Fixed(8), uneven(&mesh, 40.0)] {
+            let place = DAffine3::from_rotation_y(0.4) * DAffine3::from_scale(DVec3::new(-30.0, 30.0, 30.0));
+            let world = world_of(vec![(mesh.clone(), place, rate)]);
+            let bounds = world.meshes()[0].bounds_in_world();
+            let caches = [0, 1].map(|_| cache_of(&world, CacheConfig::with_bytes(16 << 20)));
+            let rays = leaving_upwards(&mut Intersector::new(&world, &caches[1]), bounds, &mut random);
+            let lookups = |cache: usize, is_told: bool| {
+                let before = caches[cache].segments().statistics().lookups;
+                let mut tracer = Intersector::new(&world, &caches[cache]);
+                let above = |ray: &Ray| ray.above.filter(|_| is_told);
+                let hits: Vec<bool> =
+                    rays.iter().map(|ray| tracer.occluded(&Ray { above: above(ray), ..*ray })).collect();
+                let nearest = |ray: &Ray| tracer.closest(&Ray { above: above(ray), ..*ray }).is_some();
+                assert!(rays.iter().map(nearest).eq(hits.iter().copied()), "{name} at {rate:?}");
+                drop(tracer);
+                (hits, caches[cache].segments().statistics().lookups - before)
+            };
+            // What is above the first of them is not known yet.
+            let (told, _) = lookups(0, true);
+            let ((again, n_told), (plain, n_plain)) = (lookups(0, true), lookups(1, false));
+            assert!(told == plain && again == plain, "{name} at {rate:?}");
+            (n_left, n_all) = (n_left + n_told, n_all + n_plain);
+        }
+    }
+    assert!(4 * n_left < n_all, "{n_left} of {n_all} blocks were looked at");
+}
+
+/// Many rays that leave one place of the mesh, seen from above.
+fn leaving_upwards(tracer: &mut Intersector<'_>, bounds: DBounds, random: &mut Random) -> Vec<Ray> {
+    let from = bounds.center() + bounds.diagonal() * DVec3::new(0.11, 2.0, 0.07);
+    let mut ray = || {
+        let down = Ray::new(from + 0.003 * bounds.diagonal() * random.in_cube(), -DVec3::Y);
+        let hit = tracer.closest(&down).expect("it is below");
+        let at = tracer.surface_point(&down, &hit);
+        let up = at.geometric_normal * at.geometric_normal.y.signum();
+        let (origin, direction) = (at.position + at.clearance * up, up + 0.95 * random.in_cube().normalize());
+        Ray { from: Some(hit.primitive), above: Some(at.clearance as f32), ..Ray::new(origin, direction) }
+    };
+    (0..20_000).map(|_| ray()).collect()
+}
+
+#[test]
 fn rays_from_triangles_that_are_not_there_are_traced() {
     let world = world_of(vec![(shapes::cube(), DAffine3::IDENTITY, DicingRate::Fixed(20))]);
     let cache = cache_of(&world, CacheConfig::with_bytes(1 << 20));
@@ -180,7 +232,7 @@ fn rays_from_triangles_that_are_not_there_are_traced() {
     for cell in [[999, 0], [0, 999], [20, 20], [32767, 32767]] {
         let from = PrimitiveRef { cell, ..hit.primitive };
         for _ in 0..200 {
-            let hit = tracer.closest(&Ray { from: Some(from), is_above: true, ..ray });
+            let hit = tracer.closest(&Ray { from: Some(from), above: Some(0.0), ..ray });
             assert!(hit.is_none_or(|hit| hit.t > 1.0), "{cell:?}: {hit:?}");
         }
     }
@@ -193,7 +245,7 @@ fn leaving(ray: &Ray, tracer: &mut Intersector<'_>, random: &mut Random) -> Vec<
     let ray = |direction: DVec3| {
         let side = at.clearance * direction.dot(at.geometric_normal).signum();
         let origin = at.position + side * at.geometric_normal;
-        Ray { from: Some(hit.primitive), is_above: true, ..Ray::new(origin, direction) }
+        Ray { from: Some(hit.primitive), above: Some(at.clearance as f32), ..Ray::new(origin, direction) }
     };
     (0..20).map(|k| ray(random.in_cube() + f64::from(k % 3) * at.geometric_normal)).collect()
 }

@@ -1,6 +1,6 @@
 //! What was found out about things that have numbers, remembered for all threads as long as there is room.
 //!
-//! An entry is four words: a **label**, which says whose the entry is and whether it is known, and three words of what is known. Another
+//! An entry is a **label**, which says whose the entry is and whether it is known, and some words of what is known. Another
 //! number may take the entry over at any time. Until something is known, the label counts how often it was asked for.
 //!
 //! # The protocol
@@ -15,54 +15,94 @@ use super::sync::{AtomicU64, Ordering, fence};
 /// Set in the labels of known entries.
 const KNOWN: u64 = 1 << 31;
 
+/// Marks in a word.
+const MARKS: usize = u64::BITS as usize;
+
 /// Somebody writes. No number has this label.
 const BUSY: u64 = u64::MAX;
 
-/// A table of three words for each of some numbers.
-pub struct MemoTable {
+/// A table of so many words for each of some numbers.
+pub struct MemoTable<const WORDS: usize> {
     /// A power of two of them, or none.
-    entries: Box<[Entry]>,
+    entries: Box<[Entry<WORDS>]>,
+    /// A bit for each of them, set when something is known there for the first time: these lie closer together than labels.
+    marks: Box<[AtomicU64]>,
     n_editions: AtomicU64,
 }
 
-/// Half a cache line.
+/// Half a cache line, or some.
 #[repr(align(32))]
-struct Entry {
+struct Entry<const WORDS: usize> {
     label: AtomicU64,
-    words: [AtomicU64; 3],
+    words: [AtomicU64; WORDS],
 }
 
-impl MemoTable {
+/// What is known of a number, about to be read.
+pub struct Known<'t, const WORDS: usize> {
+    entry: &'t Entry<WORDS>,
+    label: u64,
+}
+
+impl<const WORDS: usize> Known<'_, WORDS> {
+    /// One of the words, or of another entry's if it [was replaced](Self::was_there) meanwhile.
+    #[inline(always)]
+    pub fn word(&self, k: usize) -> u64 {
+        self.entry.words[k].load(Ordering::Relaxed)
+    }
+
+    /// Whether all words that were read are of that number.
+    #[inline(always)]
+    pub fn was_there(&self) -> bool {
+        // Pairs with the writer's: whoever saw one of its words sees its label.
+        fence(Ordering::Acquire);
+        self.entry.label.load(Ordering::Relaxed) == self.label
+    }
+}
+
+impl<const WORDS: usize> MemoTable<WORDS> {
     /// A table of so many entries, rounded up to a power of two.
     pub fn new(n_entries: usize) -> Self {
         let zero = || AtomicU64::new(0);
-        let entry = |_| Entry { label: zero(), words: [zero(), zero(), zero()] };
-        Self { entries: (0..rounded_up(n_entries)).map(entry).collect(), n_editions: zero() }
+        let entry = |_| Entry { label: zero(), words: std::array::from_fn(|_| zero()) };
+        let n = rounded_up(n_entries);
+        let marks = (0..n.div_ceil(MARKS)).map(|_| zero()).collect();
+        Self { entries: (0..n).map(entry).collect(), marks, n_editions: zero() }
     }
 
     /// Bytes of a table of so many entries.
     pub fn bytes_for(n_entries: usize) -> usize {
-        rounded_up(n_entries) * size_of::<Entry>()
+        let n = rounded_up(n_entries);
+        n * size_of::<Entry<WORDS>>() + n.div_ceil(MARKS) * size_of::<u64>()
     }
 
     #[inline(always)]
-    fn entry(&self, number: u32) -> Option<&Entry> {
-        self.entries.get(number as usize & self.entries.len().wrapping_sub(1))
+    fn place(&self, number: u32) -> usize {
+        number as usize & self.entries.len().wrapping_sub(1)
+    }
+
+    #[inline(always)]
+    fn entry(&self, number: u32) -> Option<&Entry<WORDS>> {
+        self.entries.get(self.place(number))
+    }
+
+    /// What is known of a number, for reading some of it.
+    #[inline(always)]
+    pub fn known(&self, number: u32) -> Option<Known<'_, WORDS>> {
+        let place = self.place(number);
+        if self.marks.get(place / MARKS)?.load(Ordering::Relaxed) >> (place % MARKS) & 1 == 0 {
+            return None;
+        }
+        let entry = self.entries.get(place)?;
+        let label = entry.label.load(Ordering::Acquire);
+        is_known(label, number).then_some(Known { entry, label })
     }
 
     /// What is known of a number.
     #[inline(always)]
-    pub fn get(&self, number: u32) -> Option<[u64; 3]> {
-        let entry = self.entry(number)?;
-        let label = entry.label.load(Ordering::Acquire);
-        if !is_known(label, number) {
-            return None;
-        }
-        let [a, b, c] = &entry.words;
-        let words = [a.load(Ordering::Relaxed), b.load(Ordering::Relaxed), c.load(Ordering::Relaxed)];
-        // Pairs with the writer's: whoever saw one of its words sees its label.
-        fence(Ordering::Acquire);
-        (entry.label.load(Ordering::Relaxed) == label).then_some(words)
+    pub fn get(&self, number: u32) -> Option<[u64; WORDS]> {
+        let known = self.known(number)?;
+        let words = std::array::from_fn(|k| known.word(k));
+        known.was_there().then_some(words)
     }
 
     /// Counts a question about a number that is not known. True if it has been asked for often enough: `patience()` times before.
@@ -88,7 +128,7 @@ impl MemoTable {
     }
 
     /// Remembers what is known of a number, unless somebody is writing there.
-    pub fn put(&self, number: u32, words: [u64; 3]) {
+    pub fn put(&self, number: u32, words: [u64; WORDS]) {
         let Some(entry) = self.entry(number) else { return };
         let label = entry.label.load(Ordering::Relaxed);
         let is_mine =
@@ -102,6 +142,8 @@ impl MemoTable {
         }
         let edition = self.n_editions.fetch_add(1, Ordering::Relaxed) & (KNOWN - 1);
         entry.label.store(label_of(number, KNOWN | edition), Ordering::Release);
+        let place = self.place(number);
+        self.marks[place / MARKS].fetch_or(1 << (place % MARKS), Ordering::Relaxed);
     }
 }
 
@@ -150,7 +192,7 @@ mod tests {
     fn a_table_without_entries_remembers_nothing() {
         let table = MemoTable::new(0);
         table.put(0, [1; 3]);
-        assert!(table.get(0).is_none() && !table.is_due(0, true, || 0) && MemoTable::bytes_for(0) == 0);
+        assert!(table.get(0).is_none() && !table.is_due(0, true, || 0) && MemoTable::<3>::bytes_for(0) == 0);
     }
 
     #[test]

@@ -2,7 +2,8 @@
 
 use super::boxes::{CellRect, HEAD_BYTES, Head, IntegerBox, LaneBoxes};
 use crate::math::simd::{self, Kernel, Task};
-use crate::math::{LatticeGrid, WINDOW};
+use crate::math::{Bounds, LatticeGrid, WINDOW};
+use glam::IVec3;
 
 /// Cells a piece can have along u and along v.
 pub const MAX_CELLS: usize = 8;
@@ -307,6 +308,13 @@ impl<'b> PieceView<'b> {
         self.head.cells
     }
 
+    /// Around all vertices.
+    pub fn bounds(&self) -> Bounds {
+        let [n_u, n_v] = self.cells().size();
+        let places = (0..=n_v).flat_map(|j| (0..=n_u).map(move |i| (i, j)));
+        places.map(|(i, j)| IVec3::from_array(self.vertex(i, j)).as_vec3()).collect()
+    }
+
     /// Lattice point (i, j) of the piece, 0 <= i <= n_u, 0 <= j <= n_v.
     #[inline]
     pub fn vertex(&self, i: usize, j: usize) -> [i32; 3] {
@@ -351,4 +359,14 @@ impl<'b> PieceView<'b> {
     pub(super) fn columns(&self) -> usize {
         2 * usize::from(self.head.lanes[0]) + 1
     }
+}
+
+/// Whether the ray starts on a triangle of this piece and leaves to where it is seen clockwise.
+pub(super) fn leaves_below(piece: &PieceView<'_>, ray: &super::LatticeRay) -> bool {
+    let (CellRect { i0, i1, j0, j1 }, [i, j]) = (piece.cells(), ray.start_cell());
+    if !(u32::from(i0)..u32::from(i1)).contains(&i) || !(u32::from(j0)..u32::from(j1)).contains(&j) {
+        return false;
+    }
+    let [a, b, c] = piece.corners(ray.skip).map(|corner| corner.as_dvec3());
+    (b - a).cross(c - a).dot(ray.direction()) < 0.0
 }

@@ -245,9 +245,10 @@ impl LatticeRay {
         (inner + inner.abs() * 1e-6 + self.t_start.abs() * 1e-12) as f32
     }
 
-    /// True for an eighth of all rays, without further meaning.
-    pub fn is_one_in_eight(&self) -> bool {
-        self.shear[0].to_bits().is_multiple_of(8)
+    /// True for one of so many rays, a power of two, without further meaning.
+    #[inline(always)]
+    pub fn is_one_in(&self, n: u32) -> bool {
+        self.shear[0].to_bits().is_multiple_of(n)
     }
 
     /// The direction as boxes see it: scaled, and rounded twice more than that of the ray.

@@ -28,15 +28,15 @@ pub struct Ray {
     pub t_max: f32,
     /// The triangle the ray starts on, if any: it is not hit.
     pub from: Option<PrimitiveRef>,
-    /// Whether the origin lies above `from`: a point of that triangle moved along its normal, to the side to which the ray leaves, far enough
-    /// that rounding does not put it on the wrong side of a neighbour. Such a ray need not be tested against surface that it cannot meet again.
-    pub is_above: bool,
+    /// How far above `from` the origin lies, if it does: a point of that triangle moved along its normal by no more than this, in world space, to the side to which the ray leaves, far enough
+    /// that rounding does not put it on the wrong side of a neighbour. Such a ray need not be tested against surface that it cannot meet.
+    pub above: Option<f32>,
 }
 
 impl Ray {
     /// A ray without end.
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
-        Self { origin, direction, t_max: f32::INFINITY, from: None, is_above: false }
+        Self { origin, direction, t_max: f32::INFINITY, from: None, above: None }
     }
 }
 

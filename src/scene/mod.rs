@@ -16,6 +16,8 @@ pub mod intersect;
 pub mod light;
 pub mod material;
 mod patch_walk;
+mod pieces;
 pub mod rate;
+mod skyline;
 pub mod tessellate;
 pub mod world;

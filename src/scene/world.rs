@@ -1,6 +1,6 @@
 //! Everything about the scene's geometry that stays the same during a render.
 
-use super::accel::{BUILD_BYTES_PER_PATCH, TopLevel};
+use super::accel::{BUILD_BYTES_PER_PATCH, LeafRef, TopLevel};
 use super::costs::BuildCosts;
 use super::departure::Departures;
 use super::description::MeshDescription;
@@ -75,6 +75,7 @@ pub struct WorldMesh {
     /// Into the top level's box, widened by more than a ray's rounding.
     entrance: Entrance,
     keeps_angles: bool,
+    lattice_per_world: f32,
 }
 
 /// What the full tessellation would take.
@@ -215,6 +216,7 @@ impl WorldMesh {
             bounds_in_world,
             entrance: Entrance::new(&lattice_from_world, reach),
             keeps_angles: keeps_angles(&lattice_from_world.matrix3),
+            lattice_per_world: 1.02 * lattice_from_world.matrix3.x_axis.length() as f32,
             surface,
         })
     }
@@ -235,6 +237,12 @@ impl WorldMesh {
     #[inline(always)]
     pub(super) fn keeps_angles(&self) -> bool {
         self.keeps_angles
+    }
+
+    /// Lattice steps of a unit of the world's, at most; of meshes whose transforms [keep angles](Self::keeps_angles).
+    #[inline(always)]
+    pub(super) fn lattice_per_world(&self) -> f32 {
+        self.lattice_per_world
     }
 
     /// The limit surface.
@@ -280,6 +288,13 @@ impl WorldMesh {
     /// those in larger boxes that `enter` turns down.
     pub fn visit_patches(&self, enter: impl FnMut(&Bounds) -> bool, mut found: impl FnMut(PatchId, &Bounds)) {
         self.top.visit(enter, |leaf, bounds| found(self.patch_of_leaf(leaf), bounds));
+    }
+
+    /// Calls `enter` for every such patch, and for boxes of several of them, for what is in them if it says so.
+    pub(super) fn visit_boxes(&self, mut enter: impl FnMut(Option<LeafRef>, &Bounds) -> bool) {
+        self.top.visit_boxes(|leaf, bounds| {
+            enter(leaf.map(|leaf| LeafRef { patch: self.patch_of_leaf(leaf.patch), ..leaf }), bounds)
+        });
     }
 
     /// How finely a patch is diced.
@@ -482,7 +497,7 @@ impl GridCache {
         world.meshes.iter().map(|m| m.top.n_slots()).map(|n| 8 * n + 8 * n.div_ceil(64)).sum()
     }
 
-    /// Bytes of what all threads remember of patches that rays leave, whatever the number of faces: 512 KiB at most.
+    /// Bytes of what all threads remember of patches that rays leave, whatever the number of faces: some 3 MiB at most.
     pub fn departure_bytes_for(world: &World) -> usize {
         Departures::bytes_for(world.meshes.iter().map(|m| m.surface.n_patches()).sum())
     }

@@ -41,19 +41,13 @@ mod strip;
 
 pub use borders::Borders;
 
-use super::{CellRect, LatticeRay, PieceView, VertexFormat};
+use super::frame::{self, Course, MARGIN_IN_HEIGHT, PACKED, PARTS, PackedFrame, part, parts_per_cell};
+use super::{LatticeRay, PieceView, VertexFormat, leaves_below};
 use crate::math::simd::{self, Kernel, Task};
 use bytemuck::{Pod, Zeroable};
 use edges::{Measure, Steepest};
 use glam::{IVec3, Vec3};
 use strip::Strip;
-
-/// Parts into which a patch's cells are divided along u, and along v: where in it a ray starts is known that well. Of occlusion rays on monsterfrog at 8,
-/// one part would spare 0.78 the patch, two 0.88, four 0.92, eight 0.94 (found in double precision, ravines not looked at).
-const PARTS: usize = 4;
-
-/// Length of the longest component of a packed vector. So rises up to that slope, and nearly twice that, fit a byte.
-const PACKED: f32 = 63.0;
 
 /// The rise of what nobody clears.
 const NEVER: i8 = i8::MAX - 1;
@@ -76,9 +70,6 @@ const ROUNDS: usize = 2;
 /// By how much a ray has to be higher than every chord, for the roundings of both: some 2^-20.
 const MARGIN: f32 = 1.0 / 1024.0;
 
-/// The same for what is not as far along the surface as it is high: errors of scalar products with components of some 2^13 at most.
-const MARGIN_IN_HEIGHT: f32 = 0.25;
-
 /// The slope of parts without cells.
 const NO_EDGE: f32 = f32::MIN;
 
@@ -86,21 +77,15 @@ const NO_EDGE: f32 = f32::MIN;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Horizon {
-    /// For u and v: m_u or m_v, and 64 times the parts in a cell. The highest bit of the first of those is set if n is to be turned.
-    frame: [[u8; 4]; 2],
+    frame: PackedFrame,
     /// Along u and v, where it grows and where it shrinks, from each part, in units of n over those of m_u or m_v; even numbers. The lowest bits, one after
     /// the other, are set for parts (0, 0), (0, 1) and so on that are ravines.
     rises: [[[i8; PARTS]; 2]; 2],
 }
 
-/// This is added to components of packed vectors, so that none is negative.
-const BIAS: u8 = 128;
-
-const IS_TURNED: u8 = 0x80;
-
 impl Horizon {
     /// Of a surface that may be seen from itself anywhere.
-    pub const NONE: Self = Self { frame: [[BIAS, BIAS, BIAS, 0]; 2], rises: [[[0; PARTS]; 2]; 2] };
+    pub const NONE: Self = Self { frame: PackedFrame::NONE, rises: [[[0; PARTS]; 2]; 2] };
 
     /// The horizon of all pieces of one grid together, on the side to which the ray leaves it;
     /// [`NONE`](Self::NONE) if the surface is too steep.
@@ -127,29 +112,12 @@ impl Horizon {
     /// Whether the ray is so high that it does not meet the surface that it starts on, or above as said.
     #[inline(always)]
     pub fn is_cleared_by<K: Kernel>(self, k: K, ray: &LatticeRay) -> bool {
-        const YZX: i32 = 0b11_00_10_01;
-        const ZXY: i32 = 0b11_01_00_10;
-        let [[.., parts_u], [.., parts_v]] = self.frame;
-        let bias = k.splat(f32::from(BIAS));
-        // m_u and m_v, and the other way round.
-        let m = k.sub(k.widen(bytemuck::cast_ref(&self.frame)), bias);
-        let [first, second] = self.frame;
-        let other = k.sub(k.widen(bytemuck::cast_ref(&[second, first])), bias);
-        let up = k.sub(
-            k.mul(k.shuffle::<YZX>(m), k.shuffle::<ZXY>(other)),
-            k.mul(k.shuffle::<ZXY>(m), k.shuffle::<YZX>(other)),
-        );
-        let d = k.div(k.splat(1.0), k.load(&ray.inv));
-        let (ways, heights) = (sum_of_three(k, k.mul(m, d)), sum_of_three(k, k.mul(up, d)));
-        let [i, j] = ray.start_cell();
-        let signs = k.negative(ways);
-        let (u, v) = (part(i, parts_u), part(j, parts_v));
-        let (rise_u, rise_v) = (rise(self.rises[0], signs & 1, u), rise(self.rises[1], signs >> 4 & 1, v));
-        let (ways, heights) = (k.store(k.abs(ways)), k.store(heights));
-        let height = if parts_u & IS_TURNED != 0 { heights[4] } else { heights[0] };
+        let [u, v] = self.frame.part(ray.start_cell());
+        let Course { ways, shrinks, height } = self.frame.course(k, k.div(k.splat(1.0), k.load(&ray.inv)));
+        let (rise_u, rise_v) = (rise(self.rises[0], shrinks[0], u), rise(self.rises[1], shrinks[1], v));
         rise_u.max(rise_v) < NEVER
             && !self.is_ravine(u, v)
-            && height > f32::from(rise_u) * ways[0] + f32::from(rise_v) * ways[4] + MARGIN_IN_HEIGHT
+            && height > f32::from(rise_u) * ways[0] + f32::from(rise_v) * ways[1] + MARGIN_IN_HEIGHT
     }
 
     /// Whether nobody leaves from part (u, v).
@@ -158,12 +126,6 @@ impl Horizon {
         let rises = if u < 2 { self.rises[0] } else { self.rises[1] };
         byte(rises, PARTS as u32 * (u % 2) + v) & RAVINE != 0
     }
-}
-
-/// In each half, the sum of lanes 0 to 2, in lane 0.
-#[inline(always)]
-fn sum_of_three<K: Kernel>(k: K, x: K::F) -> K::F {
-    k.add(k.add(x, k.shuffle::<0b01_01_01_01>(x)), k.shuffle::<0b10_10_10_10>(x))
 }
 
 /// What a way along u or v brings at most, where it grows (0) or shrinks (1).
@@ -177,27 +139,6 @@ fn rise(rises: [[i8; PARTS]; 2], way: u32, part: u32) -> i8 {
 fn byte(rises: [[i8; PARTS]; 2], k: u32) -> i8 {
     let all: u64 = bytemuck::cast(rises);
     (all.to_le() >> (8 * k)) as i8
-}
-
-/// 64 times the parts in one of `n` cells, so that no cell is in a fifth part.
-fn parts_per_cell(n: usize) -> u8 {
-    (64 * PARTS / n.max(1)).min(127) as u8
-}
-
-/// The part of the patch in which a cell is. (That of a cell which is not there is some part.)
-#[inline(always)]
-fn part(cell: u32, parts_per_cell: u8) -> u32 {
-    cell * u32::from(parts_per_cell & !IS_TURNED) / 64 % PARTS as u32
-}
-
-/// Whether the ray starts on a triangle of this piece and leaves to where it is seen clockwise.
-fn leaves_below(piece: &PieceView<'_>, ray: &LatticeRay) -> bool {
-    let (CellRect { i0, i1, j0, j1 }, [i, j]) = (piece.cells(), ray.start_cell());
-    if !(u32::from(i0)..u32::from(i1)).contains(&i) || !(u32::from(j0)..u32::from(j1)).contains(&j) {
-        return false;
-    }
-    let [a, b, c] = piece.corners(ray.skip).map(|corner| corner.as_dvec3());
-    (b - a).cross(c - a).dot(ray.direction()) < 0.0
 }
 
 struct OfPieces<'a, I> {
@@ -329,10 +270,7 @@ impl Frame {
             of_u += (b - a).as_vec3() + (d - c).as_vec3();
             of_v += (c - a).as_vec3() + (d - b).as_vec3();
         }
-        let (of_u, of_v) = (of_u.try_normalize()?, of_v.try_normalize()?);
-        let normal = of_u.cross(of_v).try_normalize()?;
-        // Each at a right angle to the other's edges.
-        let along = [of_v.cross(normal), normal.cross(of_u)].map(|m| (m * (PACKED / m.abs().max_element())).round());
+        let along = frame::axes(of_u, of_v)?;
         Some(Self { along, up: along[0].cross(along[1]) })
     }
 
@@ -353,12 +291,7 @@ impl Frame {
             let parts = (0..PARTS).flat_map(|u| (0..PARTS).map(move |v| [u, v]));
             bits.zip(parts).filter(|(_, part)| self.is_ravine(&planes, *part)).for_each(|(bit, _)| *bit |= RAVINE);
         }
-        let frame_of = |axis: usize| {
-            let [x, y, z] = (self.along[axis] + f32::from(BIAS)).to_array().map(|x| x as u8);
-            [x, y, z, planes[axis].parts]
-        };
-        let mut frame = [frame_of(0), frame_of(1)];
-        frame[0][3] |= if slopes.is_turned { IS_TURNED } else { 0 };
+        let frame = PackedFrame::new(self.along, planes.each_ref().map(|p| p.parts), slopes.is_turned);
         Horizon { frame, rises }
     }
 

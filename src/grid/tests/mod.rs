@@ -5,6 +5,6 @@ mod encoding;
 mod horizon;
 mod rays;
 mod slow;
-mod support;
+pub(in crate::grid) mod support;
 mod tracing;
 mod watertight;

@@ -44,7 +44,8 @@ impl<'a> Interaction<'a> {
         let side =
             if direction.dot(self.geometric_normal) >= 0.0 { self.point.clearance } else { -self.point.clearance };
         let origin = self.point.position + side * self.geometric_normal;
-        Ray { from: Some(self.hit.primitive), is_above: true, ..Ray::new(origin, direction) }
+        let above = Some(self.point.clearance as f32);
+        Ray { from: Some(self.hit.primitive), above, ..Ray::new(origin, direction) }
     }
 
     /// Whether `direction` leaves to the side that the ray came from.

@@ -1,0 +1,96 @@
+//! How high everything stands that is seen from a patch: so that rays that leave it above that meet nothing at all, and need no walk.
+//!
+//! Nine of ten rays that leave a body of a scene meet nothing (occlusion and diffuse rays of the benchmark's meshes). A **skyline** bounds, for each of 4 x 4 **parts** of a patch and each of eight
+//! **octants** of directions around its normal, the **elevation** of all that such a ray may meet (horizon maps, Max 1988, know as much of points).
+//!
+//! # The frame
+//! Vectors m_u, m_v and n = m_u x m_v, or its opposite, which points to the side that is left. w has the coordinates x = m_u·w, y = m_v·w, and its height z = n·w.
+//! Octants are told apart by the signs of x and y and by which of them is greater in magnitude: in an octant, w goes **ahead** by max(|x|, |y|), which is linear there. Elevation is height for what one goes ahead.
+//!
+//! # What is near
+//! Some patches, the **sheet**: the own one and others that share corners with it, joined at sides along which their vertices are the same one after the other. Each triangle of them is
+//! seen from n: its normal is turned less than 87 degrees. So the sheet is the graph of a function locally. Take a rectangle D of x and y that none of the sheet's open sides enters, and around whose
+//! middle they wind once: each point of D has exactly one point of the sheet above it, since a sheet that is the graph of a function locally has as many there as its border winds (its degree), and that is the same everywhere in D.
+//!
+//! Let a ray start over D, above the sheet or on it, and meet a point t of the sheet over D. Between, above a straight line of D, runs a way on the sheet: go along it from where the ray starts, from triangle to triangle; it ends in t, as
+//! nothing else is above t's place. So the ray is not steeper than the steepest triangle on the way, seen along it. Triangles on the way are of blocks of the sheet that, from some point of the part, lie ahead in the ray's octant; the steepest of them, in
+//! the steepest direction of the octant, is the elevation of what is near.
+//!
+//! # What is far
+//! All else, and what is near but not inside of D, is put into boxes of x, y and z. From a box around the part to another the elevation in an octant is the greatest height over the least that one goes ahead, of the differences of their points that lie in that octant.
+//!
+//! # Where the ray starts
+//! On a triangle of the part, or above it along the triangle's normal N, as far as the skyline's **lift**, which D and the part's box allow for. It is above the sheet there if N itself is higher than what is near in N's octant:
+//! where that does not hold, nobody leaves.
+
+mod measure;
+mod octants;
+mod sheet;
+mod view;
+
+pub use sheet::SkylineSheet;
+pub use view::SkylineView;
+
+use super::frame::{Course, MARGIN_IN_HEIGHT, PARTS, PackedFrame};
+use crate::math::simd::Kernel;
+use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
+
+/// Units of elevation in that of height over way: elevations up to 4 fit a byte.
+const UNITS: f32 = 0.5;
+
+/// The elevation of what nobody clears.
+const NEVER: i8 = i8::MAX;
+
+/// Lengths of directions whose products with the frame are neither too small nor too large for f32.
+const ORDINARY: Range<f32> = 1e-20..1e20;
+
+/// How high everything stands that is seen from each part of a patch, on one side.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Skyline {
+    frame: PackedFrame,
+    /// How far above the patch rays may start, in lattice steps.
+    lift: f32,
+    unused: u32,
+    /// By 4 times the part along v and the part along u, then by octant.
+    elevations: [[i8; 8]; PARTS * PARTS],
+}
+
+impl Skyline {
+    /// Words of a skyline.
+    pub const WORDS: usize = size_of::<Self>() / size_of::<u64>();
+
+    /// Of what may be met anywhere.
+    pub const NONE: Self =
+        Self { frame: PackedFrame::NONE, lift: 0.0, unused: 0, elevations: [[NEVER; 8]; PARTS * PARTS] };
+
+    /// In words.
+    pub fn to_words(self) -> [u64; Self::WORDS] {
+        bytemuck::cast(self)
+    }
+
+    /// Whether a ray in that direction, which starts on a triangle of cell `cell` or up to `lift` lattice steps above it, is so high that it meets nothing. `word` reads one of the skyline's
+    /// words: few of them are.
+    #[inline(always)]
+    pub fn is_cleared_by<K: Kernel>(
+        k: K,
+        direction: K::D,
+        cell: [u16; 2],
+        lift: f32,
+        word: impl Fn(usize) -> u64,
+    ) -> bool {
+        let frame: PackedFrame = bytemuck::cast(word(0));
+        let [u, v] = frame.part(cell.map(u32::from));
+        let elevations: [i8; 8] = bytemuck::cast(word(2 + PARTS * v as usize + u as usize));
+        let length = k.greatest_of_three(k.abs4(direction)) as f32;
+        let Course { ways: [x, y], shrinks, height } = frame.course(k, k.floats_of(direction));
+        let octant = octants::octant([x, y], shrinks);
+        let elevation = (u64::from_le_bytes(elevations.map(i8::cast_unsigned)) >> (8 * octant)) as i8;
+        let ahead = if x < y { y } else { x };
+        elevation < NEVER
+            && height > f32::from(elevation) / UNITS * ahead + MARGIN_IN_HEIGHT * length
+            && ORDINARY.contains(&length)
+            && lift <= f32::from_bits(word(1) as u32)
+    }
+}

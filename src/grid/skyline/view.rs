@@ -1,0 +1,357 @@
+//! The view from a patch's parts: what is near, then boxes of all that is far.
+
+use super::measure::Block;
+use super::octants::{Between, Extent, NOTHING, octant};
+use super::sheet::{Frame, NearPatch, SkylineSheet};
+use super::{NEVER, Skyline, UNITS};
+use crate::math::Bounds;
+use crate::math::simd::{self, Kernel, Task};
+use glam::{DVec2, Vec2, Vec3};
+
+/// Roundings of places in the frame, as a share of the patch.
+const ROUNDING: f32 = 1.0 / 1024.0;
+
+/// Roundings of lattice points and rays, in steps.
+const STEPS: f32 = 4.0;
+
+/// By how much elevations are raised for the roundings of rays, as a share.
+const MARGIN: f32 = 1.0 / 256.0;
+
+/// The same in height over way.
+const MARGIN_OF_STEEPNESS: f32 = 1.0 / 64.0;
+
+/// The most that is seen of a patch: each of its parts to be left in some directions.
+pub struct SkylineView {
+    frame: Frame,
+    parts: Vec<Part>,
+    /// All parts.
+    from: Start,
+    /// The lowest elevations of all parts.
+    lowest: [f32; 8],
+}
+
+/// Where rays start.
+#[derive(Clone, Copy)]
+struct Start {
+    extent: Extent,
+    /// Heights are counted from there: the least.
+    floor: f32,
+}
+
+impl Start {
+    fn in_box(b: &Bounds) -> Self {
+        Self { extent: simd::run(ExtentOf(b)), floor: b.min.z }
+    }
+
+    /// How high a box stands at most, octant by octant.
+    #[inline(always)]
+    fn elevations<K: Kernel>(&self, k: K, extent: &Extent, top: f32) -> K::F {
+        Between::of(k, &self.extent, extent).elevations(k, top - self.floor)
+    }
+}
+
+struct ExtentOf<'a>(&'a Bounds);
+
+impl Task for ExtentOf<'_> {
+    type Output = Extent;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> Extent {
+        Extent::of(k, self.0)
+    }
+}
+
+/// A part of the patch that may be left.
+struct Part {
+    number: usize,
+    from: Start,
+    elevations: [f32; 8],
+}
+
+impl SkylineSheet {
+    /// The view from the first of the patches, past all of them; `None` if no part of it can be left.
+    pub fn view(self) -> Option<SkylineView> {
+        let Self { frame, patches, others, normals } = self;
+        let joined = joined(&patches);
+        let border = Border::of(&frame, &patches, &joined);
+        let own = patches[0].whole;
+        let widths = 0.5 * (own.max - own.min);
+        let margin = margin(&frame, widths);
+        let (mut parts, mut everywhere) = (Vec::new(), Bounds::EMPTY);
+        for (number, block) in patches[0].blocks.iter().enumerate().filter(|(_, block)| !block.bounds.is_empty()) {
+            let around = Bounds { min: block.bounds.min - margin, max: block.bounds.max + margin };
+            let Some(within) = border.clearing(&around, widths) else { continue };
+            let from = Start::in_box(&around);
+            let look = LookAround { from, within, patches: &patches, joined: &joined, others: &others };
+            let [near, far] = simd::run(look);
+            if normals.iter().filter(|(of, _)| *of == number).all(|(_, normal)| lets_pass(&near, *normal)) {
+                // What is no number stays: nobody clears it.
+                let higher = |[near, far]: [f32; 2]| if near > far { near } else { far };
+                let elevations = std::array::from_fn(|octant| higher([near[octant], far[octant]]));
+                parts.push(Part { number, from, elevations });
+                everywhere = everywhere.union(around);
+            }
+        }
+        if parts.is_empty() {
+            return None;
+        }
+        let mut view = SkylineView { frame, parts, from: Start::in_box(&everywhere), lowest: [NOTHING; 8] };
+        view.see(&Sight::NOTHING);
+        Some(view)
+    }
+}
+
+/// What boxes of parts are larger by.
+fn margin(frame: &Frame, widths: Vec3) -> Vec3 {
+    let lengths = Vec3::from_array(frame.axes.map(Vec3::length));
+    let aside = (frame.lift + STEPS) * lengths + ROUNDING * widths;
+    // Nothing starts below the surface, but for roundings.
+    Vec3::new(aside.x, aside.y, STEPS * lengths.z + ROUNDING * widths.truncate().max_element() * lengths.z / lengths.x)
+}
+
+/// Which of the patches are of the sheet: those that are joined to the first one.
+fn joined(patches: &[NearPatch]) -> Vec<bool> {
+    let mut joined = vec![false; patches.len()];
+    joined[0] = true;
+    let mut pending = vec![0];
+    while let Some(from) = pending.pop() {
+        for to in 0..patches.len() {
+            if !joined[to] && share_a_side(&patches[from], &patches[to]) {
+                joined[to] = true;
+                pending.push(to);
+            }
+        }
+    }
+    joined
+}
+
+fn share_a_side(a: &NearPatch, b: &NearPatch) -> bool {
+    a.sides.iter().any(|a| b.sides.iter().any(|b| are_joined(a, b)))
+}
+
+/// Whether two sides are one, run through from opposite ends.
+fn are_joined(a: &[[i32; 3]], b: &[[i32; 3]]) -> bool {
+    a.len() == b.len() && a.len() > 1 && a[0] == b[b.len() - 1] && a.iter().eq(b.iter().rev())
+}
+
+/// The only side that is the same as this one.
+fn partner(sides: &[&[[i32; 3]]], side: usize) -> Option<usize> {
+    let mut partners = (0..sides.len()).filter(|other| *other != side && are_joined(sides[side], sides[*other]));
+    partners.next().filter(|_| partners.next().is_none())
+}
+
+/// The open sides of the sheet, edge by edge.
+struct Border {
+    edges: Vec<[DVec2; 2]>,
+}
+
+impl Border {
+    fn of(frame: &Frame, patches: &[NearPatch], joined: &[bool]) -> Self {
+        let sheet = patches.iter().zip(joined).filter(|(_, is_joined)| **is_joined);
+        let sides: Vec<&[[i32; 3]]> = sheet.flat_map(|(patch, _)| patch.sides.iter().map(Vec::as_slice)).collect();
+        let partners: Vec<Option<usize>> = (0..sides.len()).map(|side| partner(&sides, side)).collect();
+        let mut edges = Vec::new();
+        for (number, side) in sides.iter().enumerate() {
+            if partners[number].is_none_or(|partner| partners[partner] != Some(number)) {
+                let places: Vec<DVec2> = side.iter().map(|p| frame.place(*p)).collect();
+                edges.extend(places.windows(2).map(|ends| [ends[0], ends[1]]));
+            }
+        }
+        Self { edges }
+    }
+
+    /// A rectangle around that box which no edge enters, and over each of whose points there is one of the sheet; its least and greatest x and y.
+    fn clearing(&self, around: &Bounds, widths: Vec3) -> Option<[Vec2; 2]> {
+        let middle = around.center().as_dvec3().truncate();
+        let widths = widths.as_dvec3().truncate();
+        let mut reach = f64::INFINITY;
+        let mut windings = 0;
+        for [a, b] in &self.edges {
+            let (low, high) = (a.min(*b), a.max(*b));
+            let away = (low - middle).max(middle - high).max(DVec2::ZERO);
+            reach = reach.min((away / widths).max_element());
+            // Whether the half-line from the middle towards greater x is crossed, and from which side.
+            if (a.y <= middle.y) != (b.y <= middle.y) {
+                let x = a.x + (middle.y - a.y) / (b.y - a.y) * (b.x - a.x);
+                if x > middle.x {
+                    windings += if a.y <= middle.y { 1 } else { -1 };
+                }
+            }
+        }
+        let reach = reach * (1.0 - f64::from(ROUNDING)) * widths;
+        let clearing = [middle - reach, middle + reach].map(|corner| corner.as_vec2());
+        (windings * windings == 1 && reach.is_finite() && is_within(around, clearing)).then_some(clearing)
+    }
+}
+
+fn is_within(b: &Bounds, [low, high]: [Vec2; 2]) -> bool {
+    b.min.x >= low.x && b.min.y >= low.y && b.max.x <= high.x && b.max.y <= high.y
+}
+
+fn is_apart(b: &Bounds, [low, high]: [Vec2; 2]) -> bool {
+    b.max.x < low.x || b.max.y < low.y || b.min.x > high.x || b.min.y > high.y
+}
+
+/// Finds the elevations of what is near a part, and of other patches that are near.
+struct LookAround<'a> {
+    from: Start,
+    /// Where the sheet is above each place once.
+    within: [Vec2; 2],
+    patches: &'a [NearPatch],
+    joined: &'a [bool],
+    others: &'a [Block],
+}
+
+impl Task for LookAround<'_> {
+    type Output = [[f32; 8]; 2];
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> [[f32; 8]; 2] {
+        let Self { from, within, patches, joined, others } = self;
+        let (mut near, mut far) = (k.splat(NOTHING), k.splat(NOTHING));
+        for (patch, is_joined) in patches.iter().zip(joined) {
+            for block in &patch.blocks {
+                if block.bounds.is_empty() {
+                    continue;
+                }
+                let between = Between::of(k, &from.extent, &block.extent);
+                if *is_joined && !is_apart(&block.bounds, within) {
+                    near = k.max(near, between.only(k, k.load(&block.steepness)));
+                }
+                if !is_joined || !is_within(&block.bounds, within) {
+                    far = k.max(far, between.elevations(k, block.bounds.max.z - from.floor));
+                }
+            }
+        }
+        for other in others {
+            far = k.max(far, from.elevations(k, &other.extent, other.bounds.max.z));
+        }
+        [k.store(near), k.store(far)]
+    }
+}
+
+/// Whether what leaves a triangle along its normal stays above what is near.
+fn lets_pass(near: &[f32; 8], normal: Vec3) -> bool {
+    let [x, y, z] = normal.to_array();
+    let ways = [x.abs(), y.abs()];
+    let octant = octant(ways, [x, y].map(|way| u32::from(way < 0.0)));
+    let least = near[octant as usize];
+    // A triangle without area has no normal, and lets nobody start.
+    z == 0.0 || z > (least + MARGIN * least.abs() + MARGIN_OF_STEEPNESS) * ways[0].max(ways[1])
+}
+
+/// A box as it is seen.
+pub struct Sight {
+    extent: Extent,
+    top: f32,
+    /// By how many of its units the skyline may rise, if this is added; not positive: not at all.
+    pub gain: f32,
+}
+
+impl Sight {
+    /// Of what is far below.
+    const NOTHING: Self = Self { extent: Extent::NONE, top: NOTHING, gain: 0.0 };
+}
+
+struct Look<'a> {
+    view: &'a SkylineView,
+    at: &'a Bounds,
+}
+
+impl Task for Look<'_> {
+    type Output = Sight;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> Sight {
+        let Self { view, at } = self;
+        let bounds = view.frame.around(at);
+        let (extent, top) = (Extent::of(k, &bounds), bounds.max.z);
+        let gains = k.store(k.sub(view.from.elevations(k, &extent, top), k.load(&view.lowest)));
+        let mut most = NOTHING;
+        for gain in gains {
+            most = if most < gain { gain } else { most };
+        }
+        Sight { extent, top, gain: UNITS * most }
+    }
+}
+
+struct See<'a> {
+    view: &'a mut SkylineView,
+    sight: &'a Sight,
+}
+
+impl Task for See<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) {
+        let Self { view, sight } = self;
+        let mut lowest = k.splat(f32::INFINITY);
+        for part in &mut view.parts {
+            let all = k.max(k.load(&part.elevations), part.from.elevations(k, &sight.extent, sight.top));
+            part.elevations = k.store(all);
+            lowest = k.min(lowest, all);
+        }
+        view.lowest = k.store(lowest);
+    }
+}
+
+impl SkylineView {
+    /// A box of the lattice as it is seen.
+    pub fn look(&self, at: &Bounds) -> Sight {
+        simd::run(Look { view: self, at })
+    }
+
+    /// Adds what was looked at.
+    pub fn see(&mut self, sight: &Sight) {
+        simd::run(See { view: self, sight });
+    }
+
+    /// The skyline, when all else was seen.
+    pub fn skyline(&self) -> Skyline {
+        let mut skyline = Skyline { frame: self.frame.packed, lift: self.frame.lift, ..Skyline::NONE };
+        for part in &self.parts {
+            skyline.elevations[part.number] = part.elevations.map(rounded_up);
+        }
+        skyline
+    }
+}
+
+/// In units of the skyline, with some margin; [`NEVER`] if it is too much.
+fn rounded_up(elevation: f32) -> i8 {
+    let units = ((elevation + MARGIN * elevation.abs() + MARGIN_OF_STEEPNESS) * UNITS).ceil();
+    if units < f32::from(NEVER) { units.max(f32::from(i8::MIN)) as i8 } else { NEVER }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The border of a square of half-width `r`, that many times around.
+    fn square(r: f64, times: usize) -> Border {
+        let corners = [(-r, -r), (r, -r), (r, r), (-r, r)].map(|(x, y)| DVec2::new(x, y));
+        let edges = (0..4).map(|k| [corners[k], corners[(k + 1) % 4]]);
+        Border { edges: edges.cycle().take(4 * times).collect() }
+    }
+
+    #[test]
+    fn clearings_lie_within_borders_that_wind_once() {
+        let box_at = |x: f32| Bounds { min: Vec3::new(x - 1.0, -1.0, 0.0), max: Vec3::new(x + 1.0, 1.0, 1.0) };
+        let clearing = |border: &Border, x: f32| border.clearing(&box_at(x), Vec3::ONE);
+        let [low, high] = clearing(&square(4.0, 1), 1.0).expect("room for the box");
+        assert!(low.cmpgt(Vec2::new(-2.0, -3.0)).all() && high.cmplt(Vec2::new(4.0, 3.0)).all(), "{low} {high}");
+        assert!(clearing(&square(4.0, 1), 3.5).is_none(), "the border enters the box");
+        assert!(clearing(&square(4.0, 1), 6.0).is_none(), "outside");
+        assert!(clearing(&square(4.0, 2), 1.0).is_none(), "two of the sheet above each place");
+        assert!(clearing(&square(4.0, 0), 1.0).is_none(), "no border");
+    }
+
+    #[test]
+    fn normals_that_lean_into_a_wall_do_not_pass() {
+        let mut near = [0.0; 8];
+        near[0] = 2.0;
+        assert!(lets_pass(&near, Vec3::new(-1.0, -0.5, 0.1)), "away from it");
+        assert!(lets_pass(&near, Vec3::new(1.0, 0.5, 3.0)), "steeper than it");
+        assert!(!lets_pass(&near, Vec3::new(1.0, 0.5, 1.0)));
+    }
+}
