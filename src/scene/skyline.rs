@@ -202,6 +202,7 @@ mod tests {
                     );
                     let is_cleared = run(ask);
                     assert_eq!(ask.run(Portable), is_cleared, "kernels agree");
+                    assert!(!run(Cleared { lift: f32::INFINITY, ..ask }), "no lift is allowed for as large");
                     let hit = Intersector::new(&world, &cache).closest(&Ray { from: Some(from), ..ray });
                     assert!(!is_cleared || hit.is_none(), "{name}, {rate:?}, {patch}, {cell:?}: {ray:?} meets {hit:?}");
                     tally.n += 1;

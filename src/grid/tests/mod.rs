@@ -4,6 +4,7 @@ mod boxes;
 mod encoding;
 mod horizon;
 mod rays;
+mod skyline;
 mod slow;
 pub(in crate::grid) mod support;
 mod tracing;
