@@ -127,6 +127,16 @@ impl<const WORDS: usize> MemoTable<WORDS> {
         false
     }
 
+    /// Lets nobody be told for long that it is [due](Self::is_due) to find out about a number of which there is nothing to know.
+    pub fn put_off(&self, number: u32) {
+        let Some(entry) = self.entry(number) else { return };
+        let label = entry.label.load(Ordering::Relaxed);
+        if is_of(label, number) && !is_known(label, number) {
+            let _ =
+                entry.label.compare_exchange(label, label_of(number, KNOWN - 1), Ordering::Relaxed, Ordering::Relaxed);
+        }
+    }
+
     /// Remembers what is known of a number, unless somebody is writing there.
     pub fn put(&self, number: u32, words: [u64; WORDS]) {
         let Some(entry) = self.entry(number) else { return };
@@ -180,6 +190,9 @@ mod tests {
         table.put(1, [4, 5, 6]);
         assert_eq!(table.get(1), Some([4, 5, 6]));
         assert!(!table.is_due(1, true, || 0), "known");
+        assert!(!table.is_due(2, false, || 0) && table.is_due(2, false, || 0));
+        table.put_off(2);
+        assert!(!table.is_due(2, true, || 0) && table.get(2).is_none(), "put off");
         // 5 has the same place.
         assert!(table.get(5).is_none() && !table.is_due(5, false, || 0) && !table.is_due(5, false, || 0));
         assert_eq!(table.get(1), Some([4, 5, 6]));

@@ -8,16 +8,18 @@ use crate::cache::{SlotId, Visit};
 use crate::grid::{LatticeRay, Skyline, SkylineSheet, SkylineView};
 use crate::math::Bounds;
 
-/// Patches near one that are diced for its skyline, at most.
+/// Patches near one whose pieces are looked at for its skyline, at most.
 const MOST_NEAR: usize = 64;
 
-/// Pieces of a patch near another that are looked at for its skyline, at most.
+/// Pieces of each of them that are looked at, at most: a larger one is seen as its box.
 const MOST_PIECES: usize = 64;
 
-/// What is so far from a patch, as a share of the box around it, is near.
+/// What is so far from a patch, as a share of the box around it, is near. Of bigguy's rays at 8 that were asked about, 0.50, 0.58 and 0.63 cleared their skylines with a quarter, a half
+/// and the whole, of monsterfrog's 0.40, 0.50 and 0.43 (where more than [`MOST_NEAR`] are near).
 const NEAR: f32 = 0.5;
 
-/// A box of several patches is seen as one if it raises the skyline by less than this many of its units.
+/// A box of several patches is seen as one if it raises the skyline by less than this many of its units. With 4, 16 and 32 of them trex's rays clear 0.60, 0.58 and 0.52, and a skyline
+/// takes 90, 83 and 74 µs.
 const LEAST_GAIN: f32 = 16.0;
 
 /// Boxes that are opened, at most.
@@ -57,8 +59,8 @@ pub(super) fn of_patch(
 }
 
 /// Leaves of other patches near the one within these bounds.
-fn leaves_near(of: PatchContext<'_>, bounds: Bounds) -> Vec<LeafRef> {
-    let around = bounds.expanded(NEAR * (bounds.max - bounds.min).max_element());
+fn leaves_near(of: PatchContext<'_>, own: Bounds) -> Vec<LeafRef> {
+    let around = own.expanded(NEAR * (own.max - own.min).max_element());
     let mut near = Vec::new();
     of.mesh.visit_boxes(|leaf, bounds| {
         let is_near = bounds.min.cmple(around.max).all() && bounds.max.cmpge(around.min).all();

@@ -1,7 +1,7 @@
 //! Eight octants of directions around a normal, one a lane.
 
 use crate::math::Bounds;
-use crate::math::simd::Kernel;
+use crate::math::simd::{self, Kernel, Task};
 use glam::Vec3;
 
 /// By how much one goes ahead in each octant for each unit of x, and of y. Lanes are numbered as [`octant`] says.
@@ -38,6 +38,10 @@ pub(super) struct Extent {
 impl Extent {
     pub const NONE: Self = Self { ahead: [[0.0; 8]; 2], aside: [[0.0; 8]; 2] };
 
+    pub fn around(b: &Bounds) -> Self {
+        simd::run(ExtentOf(b))
+    }
+
     #[inline(always)]
     pub fn of<K: Kernel>(k: K, b: &Bounds) -> Self {
         let (middle, half) = (0.5 * (b.min + b.max), 0.5 * (b.max - b.min));
@@ -50,6 +54,17 @@ impl Extent {
         let middle = k.add(k.mul(x, k.splat(middle.x)), k.mul(y, k.splat(middle.y)));
         let half = k.add(k.mul(k.abs(x), k.splat(half.x)), k.mul(k.abs(y), k.splat(half.y)));
         [k.store(k.sub(middle, half)), k.store(k.add(middle, half))]
+    }
+}
+
+struct ExtentOf<'a>(&'a Bounds);
+
+impl Task for ExtentOf<'_> {
+    type Output = Extent;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> Extent {
+        Extent::of(k, self.0)
     }
 }
 

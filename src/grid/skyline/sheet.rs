@@ -40,8 +40,8 @@ pub struct SkylineSheet {
     pub(super) patches: Vec<NearPatch>,
     /// All others.
     pub(super) others: Vec<Block>,
-    /// Normals of the first patch's triangles, in the frame, and the numbers of their blocks.
-    pub(super) normals: Vec<(usize, Vec3)>,
+    /// Normals of the first patch's triangles, in the frame, block by block.
+    pub(super) normals: [Vec<Vec3>; PARTS * PARTS],
 }
 
 impl Frame {
@@ -106,10 +106,10 @@ impl SkylineSheet {
     }
 }
 
-/// The normals of a patch's triangles in the frame, on the side of n, and their blocks.
-fn normals(frame: &Frame, pieces: &[PieceView<'_>], cells: [usize; 2]) -> Vec<(usize, Vec3)> {
+/// The normals of a patch's triangles in the frame, on the side of n, block by block.
+fn normals(frame: &Frame, pieces: &[PieceView<'_>], cells: [usize; 2]) -> [Vec<Vec3>; PARTS * PARTS] {
     let [parts_u, parts_v] = cells.map(parts_per_cell);
-    let mut normals = Vec::with_capacity(2 * cells[0] * cells[1]);
+    let mut normals: [Vec<Vec3>; PARTS * PARTS] = Default::default();
     for piece in pieces {
         let (from, [n_u, n_v]) = (piece.cells(), piece.cells().size());
         for (i, j) in (0..n_v).flat_map(|j| (0..n_u).map(move |i| (i, j))) {
@@ -119,7 +119,7 @@ fn normals(frame: &Frame, pieces: &[PieceView<'_>], cells: [usize; 2]) -> Vec<(u
             let [a, b, c, d] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
             for normal in [(b - a).cross(c - a), (c - d).cross(b - d)] {
                 let [x, y, z] = frame.axes.map(|axis| axis.as_dvec3().dot(normal));
-                normals.push((block, Vec3::new(x as f32, y as f32, z as f32) * z.signum() as f32));
+                normals[block].push(Vec3::new(x as f32, y as f32, z as f32) * z.signum() as f32);
             }
         }
     }

@@ -40,24 +40,13 @@ struct Start {
 
 impl Start {
     fn in_box(b: &Bounds) -> Self {
-        Self { extent: simd::run(ExtentOf(b)), floor: b.min.z }
+        Self { extent: Extent::around(b), floor: b.min.z }
     }
 
     /// How high a box stands at most, octant by octant.
     #[inline(always)]
     fn elevations<K: Kernel>(&self, k: K, extent: &Extent, top: f32) -> K::F {
         Between::of(k, &self.extent, extent).elevations(k, top - self.floor)
-    }
-}
-
-struct ExtentOf<'a>(&'a Bounds);
-
-impl Task for ExtentOf<'_> {
-    type Output = Extent;
-
-    #[inline(always)]
-    fn run<K: Kernel>(self, k: K) -> Extent {
-        Extent::of(k, self.0)
     }
 }
 
@@ -72,8 +61,9 @@ impl SkylineSheet {
     /// The view from the first of the patches, past all of them; `None` if no part of it can be left.
     pub fn view(self) -> Option<SkylineView> {
         let Self { frame, patches, others, normals } = self;
-        let joined = joined(&patches);
-        let border = Border::of(&frame, &patches, &joined);
+        let sides = sides(&patches);
+        let joined = joined(patches.len(), &sides);
+        let border = Border::of(&frame, &sides, &joined);
         let own = patches[0].whole;
         let widths = 0.5 * (own.max - own.min);
         let margin = margin(&frame, widths);
@@ -84,7 +74,7 @@ impl SkylineSheet {
             let from = Start::in_box(&around);
             let look = LookAround { from, within, patches: &patches, joined: &joined, others: &others };
             let [near, far] = simd::run(look);
-            if normals.iter().filter(|(of, _)| *of == number).all(|(_, normal)| lets_pass(&near, *normal)) {
+            if normals[number].iter().all(|normal| lets_pass(&near, *normal)) {
                 // What is no number stays: nobody clears it.
                 let higher = |[near, far]: [f32; 2]| if near > far { near } else { far };
                 let elevations = std::array::from_fn(|octant| higher([near[octant], far[octant]]));
@@ -109,55 +99,91 @@ fn margin(frame: &Frame, widths: Vec3) -> Vec3 {
     Vec3::new(aside.x, aside.y, STEPS * lengths.z + ROUNDING * widths.truncate().max_element() * lengths.z / lengths.x)
 }
 
-/// Which of the patches are of the sheet: those that are joined to the first one.
-fn joined(patches: &[NearPatch]) -> Vec<bool> {
-    let mut joined = vec![false; patches.len()];
+/// A side of a patch.
+struct Side<'a> {
+    patch: usize,
+    ends: [[i32; 3]; 2],
+    points: &'a [[i32; 3]],
+}
+
+impl Side<'_> {
+    /// Whether two sides are one, run through from opposite ends.
+    fn is_joined_to(&self, other: &Self) -> bool {
+        self.ends[0] == other.ends[1]
+            && self.ends[1] == other.ends[0]
+            && self.points.len() == other.points.len()
+            && self.points.iter().eq(other.points.iter().rev())
+    }
+}
+
+/// All sides that are no points.
+fn sides(patches: &[NearPatch]) -> Vec<Side<'_>> {
+    let all = patches.iter().enumerate().flat_map(|(patch, near)| near.sides.iter().map(move |side| (patch, side)));
+    all.filter(|(_, points)| points.len() > 1)
+        .map(|(patch, points)| Side { patch, ends: [points[0], points[points.len() - 1]], points })
+        .collect()
+}
+
+/// Which of so many patches are of the sheet: those that are joined to the first one.
+fn joined(n_patches: usize, sides: &[Side<'_>]) -> Vec<bool> {
+    let mut joined = vec![false; n_patches];
     joined[0] = true;
     let mut pending = vec![0];
     while let Some(from) = pending.pop() {
-        for to in 0..patches.len() {
-            if !joined[to] && share_a_side(&patches[from], &patches[to]) {
-                joined[to] = true;
-                pending.push(to);
+        for side in sides.iter().filter(|side| side.patch == from) {
+            for other in sides.iter().filter(|other| side.is_joined_to(other)) {
+                if !joined[other.patch] {
+                    joined[other.patch] = true;
+                    pending.push(other.patch);
+                }
             }
         }
     }
     joined
 }
 
-fn share_a_side(a: &NearPatch, b: &NearPatch) -> bool {
-    a.sides.iter().any(|a| b.sides.iter().any(|b| are_joined(a, b)))
-}
-
-/// Whether two sides are one, run through from opposite ends.
-fn are_joined(a: &[[i32; 3]], b: &[[i32; 3]]) -> bool {
-    a.len() == b.len() && a.len() > 1 && a[0] == b[b.len() - 1] && a.iter().eq(b.iter().rev())
-}
-
 /// The only side that is the same as this one.
-fn partner(sides: &[&[[i32; 3]]], side: usize) -> Option<usize> {
-    let mut partners = (0..sides.len()).filter(|other| *other != side && are_joined(sides[side], sides[*other]));
+fn partner(sides: &[&Side<'_>], side: usize) -> Option<usize> {
+    let mut partners = (0..sides.len()).filter(|other| *other != side && sides[side].is_joined_to(sides[*other]));
     partners.next().filter(|_| partners.next().is_none())
 }
 
-/// The open sides of the sheet, edge by edge.
+/// The open sides of the sheet.
 struct Border {
-    edges: Vec<[DVec2; 2]>,
+    sides: Vec<OpenSide>,
+}
+
+struct OpenSide {
+    /// Around the places.
+    low: DVec2,
+    high: DVec2,
+    places: Vec<DVec2>,
+}
+
+impl OpenSide {
+    fn new(places: Vec<DVec2>) -> Self {
+        let low = places.iter().copied().reduce(DVec2::min).unwrap_or_default();
+        let high = places.iter().copied().reduce(DVec2::max).unwrap_or_default();
+        Self { low, high, places }
+    }
+}
+
+/// How far a place is from a box along x and along y.
+fn away(from: DVec2, low: DVec2, high: DVec2) -> DVec2 {
+    (low - from).max(from - high).max(DVec2::ZERO)
 }
 
 impl Border {
-    fn of(frame: &Frame, patches: &[NearPatch], joined: &[bool]) -> Self {
-        let sheet = patches.iter().zip(joined).filter(|(_, is_joined)| **is_joined);
-        let sides: Vec<&[[i32; 3]]> = sheet.flat_map(|(patch, _)| patch.sides.iter().map(Vec::as_slice)).collect();
+    fn of(frame: &Frame, sides: &[Side<'_>], joined: &[bool]) -> Self {
+        let sides: Vec<&Side<'_>> = sides.iter().filter(|side| joined[side.patch]).collect();
         let partners: Vec<Option<usize>> = (0..sides.len()).map(|side| partner(&sides, side)).collect();
-        let mut edges = Vec::new();
+        let mut open = Vec::new();
         for (number, side) in sides.iter().enumerate() {
             if partners[number].is_none_or(|partner| partners[partner] != Some(number)) {
-                let places: Vec<DVec2> = side.iter().map(|p| frame.place(*p)).collect();
-                edges.extend(places.windows(2).map(|ends| [ends[0], ends[1]]));
+                open.push(OpenSide::new(side.points.iter().map(|p| frame.place(*p)).collect()));
             }
         }
-        Self { edges }
+        Self { sides: open }
     }
 
     /// A rectangle around that box which no edge enters, and over each of whose points there is one of the sheet; its least and greatest x and y.
@@ -166,22 +192,29 @@ impl Border {
         let widths = widths.as_dvec3().truncate();
         let mut reach = f64::INFINITY;
         let mut windings = 0;
-        for [a, b] in &self.edges {
-            let (low, high) = (a.min(*b), a.max(*b));
-            let away = (low - middle).max(middle - high).max(DVec2::ZERO);
-            reach = reach.min((away / widths).max_element());
-            // Whether the half-line from the middle towards greater x is crossed, and from which side.
-            if (a.y <= middle.y) != (b.y <= middle.y) {
-                let x = a.x + (middle.y - a.y) / (b.y - a.y) * (b.x - a.x);
-                if x > middle.x {
-                    windings += if a.y <= middle.y { 1 } else { -1 };
-                }
+        for side in &self.sides {
+            let is_crossed = side.low.y <= middle.y && middle.y <= side.high.y && middle.x <= side.high.x;
+            if !is_crossed && (away(middle, side.low, side.high) / widths).max_element() >= reach {
+                continue;
+            }
+            for ends in side.places.windows(2) {
+                let [a, b] = [ends[0], ends[1]];
+                reach = reach.min((away(middle, a.min(b), a.max(b)) / widths).max_element());
+                windings += winding(middle, a, b);
             }
         }
         let reach = reach * (1.0 - f64::from(ROUNDING)) * widths;
         let clearing = [middle - reach, middle + reach].map(|corner| corner.as_vec2());
         (windings * windings == 1 && reach.is_finite() && is_within(around, clearing)).then_some(clearing)
     }
+}
+
+/// Whether the half-line from a place towards greater x is crossed on the way from a to b, and from which side: 1, -1 or 0.
+fn winding(from: DVec2, a: DVec2, b: DVec2) -> i32 {
+    if (a.y <= from.y) == (b.y <= from.y) || a.x + (from.y - a.y) / (b.y - a.y) * (b.x - a.x) <= from.x {
+        return 0;
+    }
+    if a.y <= from.y { 1 } else { -1 }
 }
 
 fn is_within(b: &Bounds, [low, high]: [Vec2; 2]) -> bool {
@@ -330,8 +363,8 @@ mod tests {
     /// The border of a square of half-width `r`, that many times around.
     fn square(r: f64, times: usize) -> Border {
         let corners = [(-r, -r), (r, -r), (r, r), (-r, r)].map(|(x, y)| DVec2::new(x, y));
-        let edges = (0..4).map(|k| [corners[k], corners[(k + 1) % 4]]);
-        Border { edges: edges.cycle().take(4 * times).collect() }
+        let side = |k: usize| OpenSide::new(vec![corners[k % 4], corners[(k + 1) % 4]]);
+        Border { sides: (0..4 * times).map(side).collect() }
     }
 
     #[test]
