@@ -245,10 +245,11 @@ impl LatticeRay {
         (inner + inner.abs() * 1e-6 + self.t_start.abs() * 1e-12) as f32
     }
 
-    /// True for one of so many rays, a power of two, without further meaning.
+    /// True for one of so many rays, a power of two, without further meaning: of those from one point as of those along one direction.
     #[inline(always)]
     pub fn is_one_in(&self, n: u32) -> bool {
-        self.shear[0].to_bits().is_multiple_of(n)
+        let [x, y, z, ..] = self.cell;
+        ((x ^ y ^ z).cast_unsigned() ^ self.shear[0].to_bits()).is_multiple_of(n)
     }
 
     /// The direction as boxes see it: scaled, and rounded twice more than that of the ray.

@@ -1,6 +1,6 @@
 //! Rays of every length and from everywhere.
 
-use super::support::{Piece, whole};
+use super::support::{Piece, Random, whole};
 use crate::grid::{LatticeHit, LatticeRay, TriangleId};
 use crate::ids::PatchId;
 use crate::math::simd::Portable;
@@ -75,4 +75,17 @@ fn a_ray_that_is_none_hits_nothing() {
     assert_eq!(t_of_hit(DVec3::ZERO, DVec3::ZERO, f32::INFINITY), None);
     assert_eq!(t_of_hit(DVec3::ZERO, DVec3::Z, -1.0), None);
     assert_eq!(t_of_hit(DVec3::ZERO, DVec3::Z, f32::NAN), None);
+}
+
+#[test]
+fn one_in_so_many_rays_is_picked_of_those_from_one_point_and_of_those_along_one_direction() {
+    let mut random = Random(0x01_1e32);
+    let share = |rays: &[LatticeRay]| rays.iter().filter(|ray| ray.is_one_in(32)).count();
+    let ray = |origin, direction| LatticeRay::new(origin, direction, f32::INFINITY, TriangleId::NONE);
+    for _ in 0..20 {
+        let (origin, direction) = (random.point(1e6), random.point(1.0));
+        let from_one: Vec<LatticeRay> = (0..3200).map(|_| ray(origin, random.point(1.0))).collect();
+        let along_one: Vec<LatticeRay> = (0..3200).map(|_| ray(random.point(1e6), direction)).collect();
+        assert!([&from_one, &along_one].into_iter().all(|rays| (50..200).contains(&share(rays))));
+    }
 }
