@@ -32,7 +32,7 @@ const MOST_SKYLINES: usize = 1 << 14;
 
 /// Rays that clear the horizon of a patch before its skyline is found, and for each of its pieces so many more. To find it takes some 80 µs for patches of one
 /// piece, 135 for four and 310 for sixteen, and spares a ray 30 to 50 ns on average: who finds it after as many rays as it takes to win that back loses half at most.
-const RAYS_BEFORE_SKYLINE: [u32; 2] = [1280, 256];
+const RAYS_BEFORE_SKYLINE: [u32; 2] = [1664, 160];
 
 /// One of so many of them is counted: who counts writes what all threads read.
 const RAYS_PER_COUNT: u32 = 32;
@@ -60,7 +60,8 @@ pub(super) struct Leaving<'c> {
 }
 
 /// Where a ray leaves a mesh.
-struct Start {
+#[derive(Clone, Copy)]
+pub(super) struct Start {
     /// The patch's among those of all meshes.
     number: u32,
     patch: PatchId,
@@ -73,18 +74,18 @@ impl<'c> Leaving<'c> {
     /// A ray that may meet whatever is there.
     pub const NOTHING: Self = Self { patch: PatchId(u32::MAX), unknown: None };
 
-    /// Of a ray at the mesh. `in_lattice` is the same ray there.
+    /// Of a ray at the mesh that starts there, if it does. `in_lattice` is the same ray there.
     #[inline(always)]
     pub fn of<K: Kernel>(
         k: K,
-        ray: &Ray,
+        start: Option<Start>,
         (id, mesh): (MeshId, &WorldMesh),
         in_lattice: &LatticeRay,
         cache: &'c GridCache,
         (builder, pin): (&mut Builder<'_>, &mut Pin<'_>),
     ) -> Self {
         let departures = cache.departures();
-        let Some(Start { number, patch, .. }) = departures.start(ray, id, mesh) else { return Self::NOTHING };
+        let Some(Start { number, patch, .. }) = start else { return Self::NOTHING };
         let Some(words) = departures.horizons.get(number) else {
             return Self { patch, unknown: Some(departures) };
         };
@@ -127,10 +128,10 @@ impl Departures {
         MemoTable::<3>::bytes_for(n_entries) + MemoTable::<{ Skyline::WORDS }>::bytes_for(n_entries.min(MOST_SKYLINES))
     }
 
-    /// Whether the ray is known to meet nothing of the mesh, by the skyline of the patch it starts on. `direction` is its direction in the lattice.
+    /// Whether a ray that starts there is known to meet nothing of the mesh, by the skyline of its patch. `direction` is its direction in the lattice.
     #[inline(always)]
-    pub fn meets_nothing<K: Kernel>(&self, k: K, ray: &Ray, direction: K::D, (id, mesh): (MeshId, &WorldMesh)) -> bool {
-        let Some(Start { number, cell, above, .. }) = self.start(ray, id, mesh) else { return false };
+    pub fn meets_nothing<K: Kernel>(&self, k: K, start: Option<Start>, direction: K::D, mesh: &WorldMesh) -> bool {
+        let Some(Start { number, cell, above, .. }) = start else { return false };
         let Some(skyline) = self.skylines.known(number) else { return false };
         let lift = above * mesh.lattice_per_world();
         Skyline::is_cleared_by(k, direction, cell, lift, |word| skyline.word(word)) && skyline.was_there()
@@ -138,7 +139,7 @@ impl Departures {
 
     /// Where the ray leaves the mesh, if it does and that is known.
     #[inline(always)]
-    fn start(&self, ray: &Ray, id: MeshId, mesh: &WorldMesh) -> Option<Start> {
+    pub fn start(&self, ray: &Ray, id: MeshId, mesh: &WorldMesh) -> Option<Start> {
         let PrimitiveRef { mesh: of, patch, cell, .. } = ray.from?;
         let above = ray.above?;
         (of == id && mesh.keeps_angles()).then(|| Start { number: self.number(id, patch), patch, cell, above })

@@ -92,13 +92,14 @@ impl Task for ClosestInMesh<'_, '_> {
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
         let entering = mesh.entrance().ray(kernel, ray);
-        if cache.departures().meets_nothing(kernel, ray, entering[1], (id, mesh))
+        let start = cache.departures().start(ray, id, mesh);
+        if cache.departures().meets_nothing(kernel, start, entering[1], mesh)
             || !mesh.entrance().is_in_reach(kernel, entering)
         {
             return None;
         }
         let in_lattice = &lattice_ray(kernel, entering, id, ray, t_max);
-        let leaving = Leaving::of(kernel, ray, (id, mesh), in_lattice, cache, (builder, pin));
+        let leaving = Leaving::of(kernel, start, (id, mesh), in_lattice, cache, (builder, pin));
         let ray = in_lattice;
         let walk = mesh.top().walk(kernel, ray, &mut stacks.mesh);
         Leaves { id, mesh, cache, visit: &pin.visit(), builder, leaving, ray }.closest(kernel, walk)
@@ -188,13 +189,14 @@ impl Task for OccludedInMesh<'_, '_> {
         let Intersector { world, cache, pin, builder, stacks, .. } = tracer;
         let mesh = world.mesh(id);
         let entering = mesh.entrance().ray(kernel, ray);
-        if cache.departures().meets_nothing(kernel, ray, entering[1], (id, mesh))
+        let start = cache.departures().start(ray, id, mesh);
+        if cache.departures().meets_nothing(kernel, start, entering[1], mesh)
             || !mesh.entrance().is_in_reach(kernel, entering)
         {
             return false;
         }
         let in_lattice = &lattice_ray(kernel, entering, id, ray, ray.t_max);
-        let leaving = Leaving::of(kernel, ray, (id, mesh), in_lattice, cache, (builder, pin));
+        let leaving = Leaving::of(kernel, start, (id, mesh), in_lattice, cache, (builder, pin));
         let ray = in_lattice;
         let table = cache.table(id);
         let visit = &pin.visit();
