@@ -303,7 +303,7 @@ fn what_is_remembered_is_read_as_it_was_written() {
     fn of(number: u32) -> [u64; 3] {
         [1, 2, 3].map(|k| u64::from(number) << 8 | k)
     }
-    fn look(table: &MemoTable, numbers: &[u32]) {
+    fn look(table: &MemoTable<3>, numbers: &[u32]) {
         for &number in numbers {
             table.get(number).into_iter().for_each(|words| assert_eq!(words, of(number)));
         }
@@ -314,6 +314,7 @@ fn what_is_remembered_is_read_as_it_was_written() {
         let other = thread::spawn(move || {
             shared.put(0, of(0));
             look(&shared, &[1]);
+            shared.put_off(1);
             if !shared.is_due(1, true, || 0) && shared.is_due(1, false, || 0) {
                 shared.put(1, of(1));
             }

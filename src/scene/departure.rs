@@ -15,6 +15,7 @@ use crate::grid::{CellRect, Horizon, LatticeRay, NodeView, Skyline};
 use crate::ids::{MeshId, PatchId};
 use crate::math::simd::{self, Kernel};
 use crate::math::{PrimitiveRef, Ray};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Patches that are remembered at most: 512 KiB. With half of them, secondary rays on trex (11,070 faces) were 2 to 6 % slower.
 const MOST_PATCHES: usize = 1 << 14;
@@ -40,12 +41,39 @@ const RAYS_PER_COUNT: u32 = 32;
 /// Pieces of a patch whose skyline is found at most: its neighbours are diced with it.
 const MOST_PIECES_OF_SKYLINE: usize = 16;
 
+/// If the mean openness of the skylines so far, in percent, is less, no more are sought: where few rays clear them they do not win back what they take.
+const LEAST_OPENNESS: u32 = 40;
+
+/// Skylines from which that is seen.
+const FIRST_SKYLINES: u32 = 32;
+
+/// How open the skylines are that were found.
+#[derive(Default)]
+struct Openness {
+    n: AtomicU32,
+    /// Of percents.
+    sum: AtomicU32,
+}
+
+impl Openness {
+    fn note(&self, openness: u32) {
+        self.n.fetch_add(1, Ordering::Relaxed);
+        self.sum.fetch_add(openness, Ordering::Relaxed);
+    }
+
+    fn is_worth_while(&self) -> bool {
+        let n = self.n.load(Ordering::Relaxed);
+        n < FIRST_SKYLINES || self.sum.load(Ordering::Relaxed) >= n.saturating_mul(LEAST_OPENNESS)
+    }
+}
+
 /// The horizons and skylines of patches that rays have left, for all threads.
 pub(super) struct Departures {
     /// By the numbers of patches among those of all meshes. No entries if there are too many for numbers of 32 bits.
     horizons: MemoTable<3>,
     /// Likewise, of those that many rays have left.
     skylines: MemoTable<{ Skyline::WORDS }>,
+    openness: Openness,
     /// How many patches there are before those of each mesh.
     first: Box<[u32]>,
 }
@@ -119,7 +147,7 @@ impl Departures {
         let first = n_patches.clone().scan(0u32, |next, n| Some(std::mem::replace(next, next.wrapping_add(n as u32))));
         let n_entries = entries_for(n_patches.sum());
         let skylines = MemoTable::new(n_entries.min(MOST_SKYLINES));
-        Self { first: first.collect(), horizons: MemoTable::new(n_entries), skylines }
+        Self { first: first.collect(), horizons: MemoTable::new(n_entries), skylines, openness: Openness::default() }
     }
 
     /// Bytes of the tables for meshes with so many patches in all: 3 MiB and 4 KiB at most.
@@ -187,11 +215,17 @@ impl Departures {
         {
             return;
         }
-        let is_found =
-            n_pieces(builder.cells_of(of)) <= MOST_PIECES_OF_SKYLINE && !of.mesh.surface().edited().has_holes();
-        match is_found.then(|| skyline::of_patch(of, ray, cache, builder, &pin.visit())) {
-            Some(skyline) if skyline != Skyline::NONE => self.skylines.put(number, skyline.to_words()),
-            _ => self.skylines.put_off(number),
+        let is_found = n_pieces(builder.cells_of(of)) <= MOST_PIECES_OF_SKYLINE
+            && !of.mesh.surface().edited().has_holes()
+            && self.openness.is_worth_while();
+        if !is_found {
+            return self.skylines.put_off(number);
+        }
+        let skyline = skyline::of_patch(of, ray, cache, builder, &pin.visit());
+        self.openness.note(skyline.openness());
+        match skyline {
+            Skyline::NONE => self.skylines.put_off(number),
+            skyline => self.skylines.put(number, skyline.to_words()),
         }
     }
 }
@@ -236,5 +270,21 @@ impl<'v> Left<'_, 'v, '_, '_> {
         with_pieces(self.of, block, self.visit, self.builder, |pieces| {
             Horizon::of_pieces(pieces.iter().copied(), &borders, ray)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn skylines_that_are_seldom_cleared_are_not_sought() {
+        let openness = Openness::default();
+        (1..FIRST_SKYLINES).for_each(|_| openness.note(LEAST_OPENNESS - 10));
+        assert!(openness.is_worth_while(), "too few to tell");
+        openness.note(LEAST_OPENNESS - 10);
+        assert!(!openness.is_worth_while());
+        (0..FIRST_SKYLINES).for_each(|_| openness.note(LEAST_OPENNESS + 10));
+        assert!(openness.is_worth_while(), "others found at the same time may be better");
     }
 }

@@ -31,7 +31,7 @@ mod view;
 pub use sheet::SkylineSheet;
 pub use view::SkylineView;
 
-use super::frame::{Course, MARGIN_IN_HEIGHT, PARTS, PackedFrame};
+use super::frame::{Course, MARGIN_IN_HEIGHT, PACKED, PARTS, PackedFrame};
 use crate::math::simd::Kernel;
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
@@ -68,6 +68,17 @@ impl Skyline {
     /// In words.
     pub fn to_words(self) -> [u64; Self::WORDS] {
         bytemuck::cast(self)
+    }
+
+    /// Roughly which share of diffuse rays from all over the patch clear it, in percent: those that are higher than an angle above the horizontal are
+    /// the square of its cosine of all, whichever octant they are in.
+    pub fn openness(&self) -> u32 {
+        let above = |elevation: i8| {
+            let slope = f32::from(elevation.max(0)) / UNITS / PACKED;
+            if elevation < NEVER { 1.0 / (1.0 + slope * slope) } else { 0.0 }
+        };
+        let all = self.elevations.as_flattened();
+        (100.0 * all.iter().map(|elevation| above(*elevation)).sum::<f32>() / all.len() as f32) as u32
     }
 
     /// Whether a ray in that direction, which starts on a triangle of cell `cell` or up to `lift` lattice steps above it, is so high that it meets nothing. `word` reads one of the skyline's

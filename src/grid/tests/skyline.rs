@@ -81,6 +81,14 @@ fn a_patch_without_its_neighbours_is_not_left_at_its_sides() {
 }
 
 #[test]
+fn what_is_seen_from_outside_is_open() {
+    let open = |patches: &[Vec<[i32; 3]>], side: f64| skyline_of(patches, side * DVec3::Z).map_or(0, |s| s.openness());
+    let (outside, inside) = (open(&nine(10.0), 1.0), open(&nine(30.0), -1.0));
+    assert!((80..=100).contains(&outside) && inside < outside, "{outside} {inside}");
+    assert_eq!(Skyline::NONE.openness(), 0);
+}
+
+#[test]
 fn rays_start_no_higher_than_the_lift() {
     let skyline = skyline_of(&nine(20.0), DVec3::Z);
     let side = RADIUS * 20f64.to_radians();
