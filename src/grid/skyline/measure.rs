@@ -13,7 +13,7 @@ use glam::{IVec3, Vec3};
 const LEAST_COSINE: f32 = 0.05;
 
 /// The least sine, roughly, of the angle between two edges of a triangle as n sees it: so that roundings of a triangle's rises are 2^-7 units of height over way at most,
-/// which [`a margin`](super::view) allows for. (Edges are exact, their heights err by 2^-22 of 2^13 for each step, and their ways are some 2^6 for each step.)
+/// which the margins of `view.rs` allow for. (Edges are exact, their heights err by 2^-22 of 2^13 for each step, and their ways are some 2^6 for each step.)
 const LEAST_SINE: f32 = 1.0 / 256.0;
 
 /// Some cells of a patch.
