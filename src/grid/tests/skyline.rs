@@ -101,6 +101,12 @@ fn rays_start_no_higher_than_the_lift() {
 fn a_patch_that_turns_away_from_itself_has_no_skyline() {
     assert!(skyline_of(&nine(60.0), DVec3::Z).is_some());
     assert_eq!(skyline_of(&nine(200.0), DVec3::Z), None);
+    let is_sheet = |width: f64| {
+        let piece = Piece::new(&nine(width)[0], whole(8, 8));
+        let ray = LatticeRay::new(DVec3::ZERO, DVec3::Z, f32::INFINITY, TriangleId::new(PATCH, 4, 4, 0));
+        SkylineSheet::new(&[piece.view()], &ray).is_some()
+    };
+    assert!(is_sheet(150.0) && !is_sheet(220.0));
 }
 
 #[test]
