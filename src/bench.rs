@@ -341,6 +341,7 @@ impl Bench {
             let from = self.settings.tells_start.then(|| tracer.closest(&ray.ray())).flatten().map(|hit| hit.primitive);
             let along = |sample: u32| {
                 let direction = cosine_direction(normal, uniform(pixel, 2 * sample), uniform(pixel, 2 * sample + 1));
+                // A little more, for the roundings of the origin.
                 SecondaryRay { ray: BenchRay { origin, direction }, from, above: 1.01 * offset }
             };
             ao.extend((0..n_ao).map(along));

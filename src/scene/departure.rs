@@ -17,7 +17,7 @@ use crate::math::simd::{self, Kernel};
 use crate::math::{PrimitiveRef, Ray};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Patches that are remembered at most: 512 KiB. With half of them, secondary rays on trex (11,070 faces) were 2 to 6 % slower.
+/// Patches that are remembered at most: 512 KiB of horizons, 2.5 MiB of skylines. With half as many horizons, secondary rays on trex (11,070 faces) were 2 to 6 % slower.
 const MOST_PATCHES: usize = 1 << 14;
 
 /// Pieces of a patch whose horizon is found at most. With 64 instead, ambient occlusion of bigguy and monsterfrog at 1920x1080 and one cell a pixel
@@ -28,17 +28,14 @@ const MOST_PIECES: usize = 256;
 /// instructions with 16 than with 8, and as many at 1920x1080 with 4 as with 8.
 const RAYS_PER_PIECE: u32 = 8;
 
-/// Patches whose skylines are remembered at most: 2.5 MiB.
-const MOST_SKYLINES: usize = 1 << 14;
-
 /// Rays that clear the horizon of a patch before its skyline is found, and for each of its pieces so many more. To find it takes some 80 µs for patches of one
-/// piece, 135 for four and 310 for sixteen, and spares a ray 30 to 50 ns on average: who finds it after as many rays as it takes to win that back loses half at most.
+/// piece, 135 for four and 310 for sixteen, and spares a ray 30 to 50 ns on average: about as many rays win that back.
 const RAYS_BEFORE_SKYLINE: [u32; 2] = [1664, 160];
 
 /// One of so many of them is counted: who counts writes what all threads read.
 const RAYS_PER_COUNT: u32 = 32;
 
-/// Pieces of a patch whose skyline is found at most: its neighbours are diced with it.
+/// Pieces of a patch whose skyline is found at most: those of all its neighbours are looked at as well.
 const MOST_PIECES_OF_SKYLINE: usize = 16;
 
 /// If the mean openness of the skylines so far, in percent, is less, no more are sought: where few rays clear them they do not win back what they take.
@@ -146,14 +143,14 @@ impl Departures {
     pub fn new(n_patches: impl Iterator<Item = usize> + Clone) -> Self {
         let first = n_patches.clone().scan(0u32, |next, n| Some(std::mem::replace(next, next.wrapping_add(n as u32))));
         let n_entries = entries_for(n_patches.sum());
-        let skylines = MemoTable::new(n_entries.min(MOST_SKYLINES));
-        Self { first: first.collect(), horizons: MemoTable::new(n_entries), skylines, openness: Openness::default() }
+        let (horizons, skylines) = (MemoTable::new(n_entries), MemoTable::new(n_entries));
+        Self { first: first.collect(), horizons, skylines, openness: Openness::default() }
     }
 
     /// Bytes of the tables for meshes with so many patches in all: 3 MiB and 4 KiB at most.
     pub fn bytes_for(n_patches: usize) -> usize {
         let n_entries = entries_for(n_patches);
-        MemoTable::<3>::bytes_for(n_entries) + MemoTable::<{ Skyline::WORDS }>::bytes_for(n_entries.min(MOST_SKYLINES))
+        MemoTable::<3>::bytes_for(n_entries) + MemoTable::<{ Skyline::WORDS }>::bytes_for(n_entries)
     }
 
     /// Whether a ray that starts there is known to meet nothing of the mesh, by the skyline of its patch. `direction` is its direction in the lattice.

@@ -1,4 +1,4 @@
-//! The skyline of a patch: what is near is diced, what is far is seen as the boxes of the tree over patches.
+//! The skyline of a patch: of what is near all pieces are looked at, what is far is seen as the boxes of the tree over patches.
 
 use super::accel::LeafRef;
 use super::builder::{Builder, PatchContext};

@@ -48,13 +48,13 @@ pub(super) struct MeasureBox<'a> {
 }
 
 impl Task for MeasureBox<'_> {
-    type Output = Option<Block>;
+    type Output = Option<Bounds>;
 
     #[inline(always)]
-    fn run<K: Kernel>(self, k: K) -> Option<Block> {
+    fn run<K: Kernel>(self, k: K) -> Option<Bounds> {
         let Self { frame, pieces } = self;
         let axes = Axes::new(k, frame);
-        let mut whole = Block::EMPTY;
+        let mut whole = Bounds::EMPTY;
         for piece in pieces {
             if piece.head.format == VertexFormat::Four as u8 {
                 return None;
@@ -65,9 +65,8 @@ impl Task for MeasureBox<'_> {
             for j in 0..=n_v {
                 columns.take_in(k, &axes, corner, &VertexRow::of(k, piece, j));
             }
-            columns.give_box_to(k, n_u, &mut whole.bounds);
+            columns.give_box_to(k, n_u, &mut whole);
         }
-        whole.extent = Extent::of(k, &whole.bounds);
         Some(whole)
     }
 }

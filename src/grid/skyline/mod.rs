@@ -8,7 +8,7 @@
 //! Octants are told apart by the signs of x and y and by which of them is greater in magnitude: in an octant, w goes **ahead** by max(|x|, |y|), which is linear there. Elevation is height for what one goes ahead.
 //!
 //! # What is near
-//! Some patches, the **sheet**: the own one and others that share corners with it, joined at sides along which their vertices are the same one after the other. Each triangle of them is
+//! Some patches, the **sheet**: the own one and others that share corners with it. Two sides of them are joined if their vertices are the same one after the other; those that are not joined to exactly one other are open. Each triangle of the sheet is
 //! seen from n: its normal is turned less than 87 degrees. So the sheet is the graph of a function locally. Take a rectangle D of x and y that none of the sheet's open sides enters, and around whose
 //! middle they wind once: each point of D has exactly one point of the sheet above it, since a sheet that is the graph of a function locally has as many there as its border winds (its degree), and that is the same everywhere in D.
 //!
@@ -92,6 +92,7 @@ impl Skyline {
         word: impl Fn(usize) -> u64,
     ) -> bool {
         let frame: PackedFrame = bytemuck::cast(word(0));
+        let [most_lift, _unused]: [f32; 2] = bytemuck::cast(word(1));
         let [u, v] = frame.part(cell.map(u32::from));
         let elevations: [i8; 8] = bytemuck::cast(word(2 + PARTS * v as usize + u as usize));
         let length = k.greatest_of_three(k.abs4(direction)) as f32;
@@ -102,6 +103,6 @@ impl Skyline {
         elevation < NEVER
             && height > f32::from(elevation) / UNITS * ahead + MARGIN_IN_HEIGHT * length
             && ORDINARY.contains(&length)
-            && lift <= f32::from_bits(word(1) as u32)
+            && lift <= most_lift
     }
 }

@@ -28,15 +28,17 @@ pub(super) fn octant([x, y]: [f32; 2], shrinks: [u32; 2]) -> u32 {
     u32::from(x < y) | shrinks[0] << 1 | shrinks[1] << 2
 }
 
-/// How far a box reaches ahead and aside in each octant: at least and at most.
+/// How far a box reaches ahead and aside in each octant, at least and at most, and up.
 #[derive(Clone, Copy)]
 pub(super) struct Extent {
     ahead: [[f32; 8]; 2],
     aside: [[f32; 8]; 2],
+    top: f32,
 }
 
 impl Extent {
-    pub const NONE: Self = Self { ahead: [[0.0; 8]; 2], aside: [[0.0; 8]; 2] };
+    /// Of what is far below.
+    pub const NONE: Self = Self { ahead: [[0.0; 8]; 2], aside: [[0.0; 8]; 2], top: NOTHING };
 
     pub fn around(b: &Bounds) -> Self {
         simd::run(ExtentOf(b))
@@ -45,7 +47,7 @@ impl Extent {
     #[inline(always)]
     pub fn of<K: Kernel>(k: K, b: &Bounds) -> Self {
         let (middle, half) = (0.5 * (b.min + b.max), 0.5 * (b.max - b.min));
-        Self { ahead: Self::range(k, &AHEAD, middle, half), aside: Self::range(k, &ASIDE, middle, half) }
+        Self { ahead: Self::range(k, &AHEAD, middle, half), aside: Self::range(k, &ASIDE, middle, half), top: b.max.z }
     }
 
     #[inline(always)]
@@ -74,6 +76,8 @@ pub(super) struct Between<K: Kernel> {
     ahead: [K::F; 2],
     /// What one goes aside at least.
     aside: K::F,
+    /// Of the one that is seen.
+    top: f32,
     /// Nothing in octants that no difference is in; elsewhere zero.
     absence: K::F,
 }
@@ -88,7 +92,7 @@ impl<K: Kernel> Between<K> {
         // Negative where there is none.
         let room = k.min(k.min(most_ahead, most_aside), k.sub(most_ahead, least_aside));
         let absence = k.mul(k.min(room, k.splat(0.0)), k.splat(FAR_BELOW));
-        Self { ahead: [least_ahead, most_ahead], aside: least_aside, absence }
+        Self { ahead: [least_ahead, most_ahead], aside: least_aside, top: to.top, absence }
     }
 
     /// These elevations in octants that differences are in.
@@ -97,9 +101,10 @@ impl<K: Kernel> Between<K> {
         k.add(elevations, self.absence)
     }
 
-    /// How high what ends at that height above where rays start stands at most.
+    /// How high the one stands at most, seen from heights of the floor and above.
     #[inline(always)]
-    pub fn elevations(&self, k: K, height: f32) -> K::F {
+    pub fn elevations(&self, k: K, floor: f32) -> K::F {
+        let height = self.top - floor;
         let height = if height.abs() < LEAST_HEIGHT { LEAST_HEIGHT } else { height };
         let [least_ahead, most_ahead] = self.ahead;
         let ahead = if height > 0.0 { k.max(least_ahead, self.aside) } else { most_ahead };
@@ -166,7 +171,7 @@ mod tests {
             };
             let (from, to) = (some_box(1.0), some_box(6.0));
             let between = Between::of(Portable, &Extent::of(Portable, &from), &Extent::of(Portable, &to));
-            let elevations = Portable.store(between.elevations(Portable, to.max.z - from.min.z));
+            let elevations = Portable.store(between.elevations(Portable, from.min.z));
             let mut inside = |b: &Bounds| -> DVec3 {
                 let share = (random.point(0.5) + 0.5).as_vec3();
                 (b.min + share * (b.max - b.min)).as_dvec3()

@@ -1,6 +1,7 @@
 //! The patches near the one that is left, measured along its axes.
 
 use super::measure::{Block, Blocks, Measure, MeasureBox};
+use super::octants::Extent;
 use crate::grid::frame::{PARTS, PackedFrame, axes, part, parts_per_cell};
 use crate::grid::{LatticeRay, PieceView, leaves_below};
 use crate::math::Bounds;
@@ -38,8 +39,8 @@ pub struct SkylineSheet {
     pub(super) frame: Frame,
     /// The one that is left, and others that share corners with it.
     pub(super) patches: Vec<NearPatch>,
-    /// All others.
-    pub(super) others: Vec<Block>,
+    /// Around all others.
+    pub(super) others: Vec<Extent>,
     /// Normals of the first patch's triangles, in the frame, block by block.
     pub(super) normals: [Vec<Vec3>; PARTS * PARTS],
 }
@@ -94,15 +95,20 @@ impl SkylineSheet {
     pub fn add(&mut self, pieces: &[PieceView<'_>]) -> bool {
         let (frame, cells) = (&self.frame, cells_of(pieces));
         let own = self.patches[0].sides.each_ref().map(|side| side[0]);
-        if pieces.iter().any(|piece| corners_of(piece).iter().any(|corner| own.contains(corner)))
-            && let Some(Blocks { parts, whole, are_seen: true }) = simd::run(Measure { frame, pieces, cells })
-        {
-            self.patches.push(NearPatch { blocks: parts, whole, sides: sides_of(pieces, cells) });
-            return true;
-        }
-        let whole = simd::run(MeasureBox { frame, pieces });
-        self.others.extend(whole);
-        whole.is_some()
+        let whole = if pieces.iter().any(|piece| corners_of(piece).iter().any(|corner| own.contains(corner))) {
+            let Some(blocks) = simd::run(Measure { frame, pieces, cells }) else { return false };
+            let Blocks { parts, whole, are_seen } = blocks;
+            if are_seen {
+                self.patches.push(NearPatch { blocks: parts, whole, sides: sides_of(pieces, cells) });
+                return true;
+            }
+            whole
+        } else {
+            let Some(whole) = simd::run(MeasureBox { frame, pieces }) else { return false };
+            whole
+        };
+        self.others.push(Extent::around(&whole));
+        true
     }
 }
 

@@ -1,6 +1,5 @@
 //! The view from a patch's parts: what is near, then boxes of all that is far.
 
-use super::measure::Block;
 use super::octants::{Between, Extent, NOTHING, octant};
 use super::sheet::{Frame, NearPatch, SkylineSheet};
 use super::{NEVER, Skyline, UNITS};
@@ -45,8 +44,8 @@ impl Start {
 
     /// How high a box stands at most, octant by octant.
     #[inline(always)]
-    fn elevations<K: Kernel>(&self, k: K, extent: &Extent, top: f32) -> K::F {
-        Between::of(k, &self.extent, extent).elevations(k, top - self.floor)
+    fn elevations<K: Kernel>(&self, k: K, extent: &Extent) -> K::F {
+        Between::of(k, &self.extent, extent).elevations(k, self.floor)
     }
 }
 
@@ -61,9 +60,7 @@ impl SkylineSheet {
     /// The view from the first of the patches, past all of them; `None` if no part of it can be left.
     pub fn view(self) -> Option<SkylineView> {
         let Self { frame, patches, others, normals } = self;
-        let sides = sides(&patches);
-        let joined = joined(patches.len(), &sides);
-        let border = Border::of(&frame, &sides, &joined);
+        let border = Border::of(&frame, &sides(&patches));
         let own = patches[0].whole;
         let widths = 0.5 * (own.max - own.min);
         let margin = margin(&frame, widths);
@@ -72,7 +69,7 @@ impl SkylineSheet {
             let around = Bounds { min: block.bounds.min - margin, max: block.bounds.max + margin };
             let Some(within) = border.clearing(&around, widths) else { continue };
             let from = Start::in_box(&around);
-            let look = LookAround { from, within, patches: &patches, joined: &joined, others: &others };
+            let look = LookAround { from, within, patches: &patches, others: &others };
             let [near, far] = simd::run(look);
             if normals[number].iter().all(|normal| lets_pass(&near, *normal)) {
                 // What is no number stays: nobody clears it.
@@ -86,7 +83,7 @@ impl SkylineSheet {
             return None;
         }
         let mut view = SkylineView { frame, parts, from: Start::in_box(&everywhere), lowest: [NOTHING; 8] };
-        view.see(&Sight::NOTHING);
+        view.see(&Sight { extent: Extent::NONE, gain: 0.0 });
         Some(view)
     }
 }
@@ -101,7 +98,6 @@ fn margin(frame: &Frame, widths: Vec3) -> Vec3 {
 
 /// A side of a patch.
 struct Side<'a> {
-    patch: usize,
     ends: [[i32; 3]; 2],
     points: &'a [[i32; 3]],
 }
@@ -118,33 +114,13 @@ impl Side<'_> {
 
 /// All sides that are no points.
 fn sides(patches: &[NearPatch]) -> Vec<Side<'_>> {
-    let all = patches.iter().enumerate().flat_map(|(patch, near)| near.sides.iter().map(move |side| (patch, side)));
-    all.filter(|(_, points)| points.len() > 1)
-        .map(|(patch, points)| Side { patch, ends: [points[0], points[points.len() - 1]], points })
-        .collect()
-}
-
-/// Which of so many patches are of the sheet: those that are joined to the first one.
-fn joined(n_patches: usize, sides: &[Side<'_>]) -> Vec<bool> {
-    let mut joined = vec![false; n_patches];
-    joined[0] = true;
-    let mut pending = vec![0];
-    while let Some(from) = pending.pop() {
-        for side in sides.iter().filter(|side| side.patch == from) {
-            for other in sides.iter().filter(|other| side.is_joined_to(other)) {
-                if !joined[other.patch] {
-                    joined[other.patch] = true;
-                    pending.push(other.patch);
-                }
-            }
-        }
-    }
-    joined
+    let all = patches.iter().flat_map(|patch| &patch.sides).filter(|points| points.len() > 1);
+    all.map(|points| Side { ends: [points[0], points[points.len() - 1]], points }).collect()
 }
 
 /// The only side that is the same as this one.
-fn partner(sides: &[&Side<'_>], side: usize) -> Option<usize> {
-    let mut partners = (0..sides.len()).filter(|other| *other != side && sides[side].is_joined_to(sides[*other]));
+fn partner(sides: &[Side<'_>], side: usize) -> Option<usize> {
+    let mut partners = (0..sides.len()).filter(|other| *other != side && sides[side].is_joined_to(&sides[*other]));
     partners.next().filter(|_| partners.next().is_none())
 }
 
@@ -174,9 +150,8 @@ fn away(from: DVec2, low: DVec2, high: DVec2) -> DVec2 {
 }
 
 impl Border {
-    fn of(frame: &Frame, sides: &[Side<'_>], joined: &[bool]) -> Self {
-        let sides: Vec<&Side<'_>> = sides.iter().filter(|side| joined[side.patch]).collect();
-        let partners: Vec<Option<usize>> = (0..sides.len()).map(|side| partner(&sides, side)).collect();
+    fn of(frame: &Frame, sides: &[Side<'_>]) -> Self {
+        let partners: Vec<Option<usize>> = (0..sides.len()).map(|side| partner(sides, side)).collect();
         let mut open = Vec::new();
         for (number, side) in sides.iter().enumerate() {
             if partners[number].is_none_or(|partner| partners[partner] != Some(number)) {
@@ -231,8 +206,7 @@ struct LookAround<'a> {
     /// Where the sheet is above each place once.
     within: [Vec2; 2],
     patches: &'a [NearPatch],
-    joined: &'a [bool],
-    others: &'a [Block],
+    others: &'a [Extent],
 }
 
 impl Task for LookAround<'_> {
@@ -240,24 +214,24 @@ impl Task for LookAround<'_> {
 
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) -> [[f32; 8]; 2] {
-        let Self { from, within, patches, joined, others } = self;
+        let Self { from, within, patches, others } = self;
         let (mut near, mut far) = (k.splat(NOTHING), k.splat(NOTHING));
-        for (patch, is_joined) in patches.iter().zip(joined) {
+        for patch in patches {
             for block in &patch.blocks {
                 if block.bounds.is_empty() {
                     continue;
                 }
                 let between = Between::of(k, &from.extent, &block.extent);
-                if *is_joined && !is_apart(&block.bounds, within) {
+                if !is_apart(&block.bounds, within) {
                     near = k.max(near, between.only(k, k.load(&block.steepness)));
                 }
-                if !is_joined || !is_within(&block.bounds, within) {
-                    far = k.max(far, between.elevations(k, block.bounds.max.z - from.floor));
+                if !is_within(&block.bounds, within) {
+                    far = k.max(far, between.elevations(k, from.floor));
                 }
             }
         }
         for other in others {
-            far = k.max(far, from.elevations(k, &other.extent, other.bounds.max.z));
+            far = k.max(far, from.elevations(k, other));
         }
         [k.store(near), k.store(far)]
     }
@@ -276,14 +250,8 @@ fn lets_pass(near: &[f32; 8], normal: Vec3) -> bool {
 /// A box as it is seen.
 pub struct Sight {
     extent: Extent,
-    top: f32,
     /// By how many of its units the skyline may rise, if this is added; not positive: not at all.
     pub gain: f32,
-}
-
-impl Sight {
-    /// Of what is far below.
-    const NOTHING: Self = Self { extent: Extent::NONE, top: NOTHING, gain: 0.0 };
 }
 
 struct Look<'a> {
@@ -297,14 +265,13 @@ impl Task for Look<'_> {
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) -> Sight {
         let Self { view, at } = self;
-        let bounds = view.frame.around(at);
-        let (extent, top) = (Extent::of(k, &bounds), bounds.max.z);
-        let gains = k.store(k.sub(view.from.elevations(k, &extent, top), k.load(&view.lowest)));
+        let extent = Extent::of(k, &view.frame.around(at));
+        let gains = k.store(k.sub(view.from.elevations(k, &extent), k.load(&view.lowest)));
         let mut most = NOTHING;
         for gain in gains {
             most = if most < gain { gain } else { most };
         }
-        Sight { extent, top, gain: UNITS * most }
+        Sight { extent, gain: UNITS * most }
     }
 }
 
@@ -321,7 +288,7 @@ impl Task for See<'_> {
         let Self { view, sight } = self;
         let mut lowest = k.splat(f32::INFINITY);
         for part in &mut view.parts {
-            let all = k.max(k.load(&part.elevations), part.from.elevations(k, &sight.extent, sight.top));
+            let all = k.max(k.load(&part.elevations), part.from.elevations(k, &sight.extent));
             part.elevations = k.store(all);
             lowest = k.min(lowest, all);
         }
