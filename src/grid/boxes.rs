@@ -125,8 +125,14 @@ impl Head {
         (self.mask, self.cells, self.grid) = (lane_mask(lanes) as u16, cells, grid);
     }
 
+    /// Whether every lane that a test can find is one of [`Self::lanes`].
+    #[inline(always)]
+    pub fn tests_its_lanes_only(&self) -> bool {
+        u32::from(self.mask) == lane_mask(self.lanes)
+    }
+
     /// Makes the lane's box one that no ray meets: along the ray's longest axis it is left 255 planes before it is entered,
-    /// and the test's slack is 48 at most on either side.
+    /// and the test's slack is 60 at most on either side.
     pub fn turn_inside_out(&mut self, lane: usize) {
         for k in 0..3 {
             (self.planes[k][lane], self.planes[k + 3][lane]) = (255, 0);

@@ -298,7 +298,8 @@ impl<'b> PieceView<'b> {
     pub fn new(bytes: &'b [u8]) -> Self {
         let head: &Head = bytemuck::from_bytes(&bytes[..HEAD_BYTES]);
         let format = usize::from(head.format);
-        assert!((2..=4).contains(&format) && used_bytes(head.lanes, format) <= bytes.len(), "a whole piece");
+        let is_whole = (2..=4).contains(&format) && used_bytes(head.lanes, format) <= bytes.len();
+        assert!(is_whole && head.tests_its_lanes_only(), "a whole piece");
         Self { head, bytes }
     }
 

@@ -1,7 +1,7 @@
 //! Rays against the triangles of a piece: eight at a time, watertight (Woop, Benthin, Wald: "Watertight Ray/Triangle Intersection", 2013).
 #![allow(unsafe_code)]
 
-use super::boxes::{HEAD_BYTES, LaneHits};
+use super::boxes::HEAD_BYTES;
 use super::ray::Axis;
 use super::{LatticeHit, LatticeRay, PieceView, TriangleId};
 use crate::ids::PatchId;
@@ -62,12 +62,6 @@ impl PieceView<'_> {
             }
         }
         false
-    }
-
-    /// The blocks whose boxes the ray meets before `t_max`.
-    #[inline(always)]
-    pub fn blocks<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> LaneHits {
-        self.head.test(kernel, ray, t_max)
     }
 
     #[inline(always)]
@@ -159,8 +153,8 @@ impl<K: Kernel> Rows<K> {
         let at = HEAD_BYTES + next * row + row_bytes * axis + BYTES * column;
         // Relative to the ray's own lattice point: exact, whatever the distance from the lattice's centre.
         let (base, origin) = (piece.head.base[axis] - ray.cell[axis], k.splat(ray.fraction[axis]));
-        // SAFETY: `PieceView::new` checked that the bytes hold every vertex of the lanes in the head and the tail after them; `BYTES` is their format. `block` is one of
-        // those lanes, so each place is at least three coordinates before the end of the vertices. The load reads four coordinates,
+        // SAFETY: `PieceView::new` checked that the bytes hold every vertex of the lanes in the head and the tail after them, and that a test finds
+        // none but those lanes; `BYTES` is their format. `block` comes from such a test, so each place is at least three coordinates before the end of the vertices. The load reads four coordinates,
         // and for BYTES = 3 four bytes more: at most one coordinate and four bytes beyond the vertices, eight bytes, the tail's size.
         let (low, high) = unsafe {
             (
