@@ -137,7 +137,8 @@ fn rays_said_to_start_above_a_surface_answer_as_if_they_were_not() {
         let turned = DAffine3::from_rotation_y(0.4);
         let mirrored = turned * DAffine3::from_scale(DVec3::new(-1e3, 1e3, 1e3));
         let stretched = turned * DAffine3::from_scale(DVec3::new(1.0, 0.1, 3.0));
-        let fixed = [(3, turned), (8, mirrored), (13, DAffine3::IDENTITY), (13, stretched), (32, turned)];
+        let barely = turned * DAffine3::from_scale(DVec3::new(1.0, 1.004, 1.0));
+        let fixed = [(3, turned), (8, mirrored), (8, barely), (13, DAffine3::IDENTITY), (13, stretched), (32, turned)];
         let fixed = fixed.map(|(rate, place)| (format!("fixed:{rate}"), DicingRate::Fixed(rate), place));
         // Sides with fewer segments than the grid.
         let pieces = [(3.0, DAffine3::IDENTITY), (9.0, mirrored)];
@@ -206,6 +207,33 @@ fn most_rays_of_many_that_leave_a_patch_need_no_walk() {
         }
     }
     assert!(4 * n_left < n_all, "{n_left} of {n_all} blocks were looked at");
+}
+
+#[test]
+fn rays_that_leave_one_of_two_meshes_for_the_other_meet_it() {
+    let mut random = Random(0x2_e5);
+    let mut n_met = 0;
+    // One over the other, so that what leaves either upwards or downwards may meet the other.
+    let sphere = |y: f64| (shapes::cube_sphere(6), DAffine3::from_translation(DVec3::Y * y), DicingRate::Fixed(8));
+    let world = world_of(vec![sphere(0.0), sphere(2.5)]);
+    let caches = [0, 1].map(|_| cache_of(&world, CacheConfig::with_bytes(16 << 20)));
+    let [mut told, mut plain] = caches.each_ref().map(|cache| Intersector::new(&world, cache));
+    for (mesh, from) in [(MeshId(0), -4.0), (MeshId(1), 6.0), (MeshId(0), 1.4), (MeshId(1), 1.1)] {
+        for _ in 0..6000 {
+            let eye = DVec3::new(0.1, from, 0.1) + 0.03 * random.in_cube();
+            let toward = DVec3::Y * (world.meshes()[mesh.idx()].bounds_in_world().center().y - from);
+            for ray in leaving(&Ray::new(eye, toward), &mut plain, &mut random).into_iter().take(3) {
+                assert_eq!(ray.from.map(|from| from.mesh), Some(mesh));
+                let wanted = plain.closest(&Ray { above: None, ..ray });
+                assert_eq!(format!("{:?}", told.closest(&ray)), format!("{wanted:?}"), "{ray:?}");
+                let near = Ray { t_max: 0.7, ..ray };
+                assert_eq!(told.occluded(&ray), wanted.is_some(), "{ray:?}");
+                assert_eq!(told.occluded(&near), wanted.is_some_and(|hit| hit.t <= 0.7), "{near:?}");
+                n_met += usize::from(wanted.is_some_and(|hit| hit.primitive.mesh != mesh));
+            }
+        }
+    }
+    assert!(n_met > 2000, "only {n_met} rays met the other mesh");
 }
 
 /// Many rays that leave one place of the mesh, seen from above.

@@ -28,8 +28,10 @@ pub struct Ray {
     pub t_max: f32,
     /// The triangle the ray starts on, if any: it is not hit.
     pub from: Option<PrimitiveRef>,
-    /// How far above `from` the origin lies, if it does: a point of that triangle moved along its normal by no more than this, in world space, to the side to which the ray leaves, far enough
-    /// that rounding does not put it on the wrong side of a neighbour. Such a ray need not be tested against surface that it cannot meet.
+    /// How far above `from` the origin lies, if it does: a point of that triangle moved along its normal by no more than
+    /// this, in world space, to the side to which the ray leaves, far enough that rounding does not put it on the wrong
+    /// side of a neighbour. Such a ray need not be tested against surface that it cannot meet. `None` if the triangle has
+    /// no area, and so no normal.
     pub above: Option<f32>,
 }
 

@@ -347,11 +347,13 @@ impl<'w> Intersector<'w> {
         hit
     }
 
-    /// The ray in the space of the tree over meshes; its `t` is only good for the order of visits.
+    /// The ray in the space of the tree over meshes; its `t` is only good for the order of visits, and ends a little later.
     fn scene_ray(&self, ray: &Ray) -> LatticeRay {
         let to = self.world.scene_from_world();
         let (origin, direction) = (to.transform_point3(ray.origin), to.transform_vector3(ray.direction));
-        LatticeRay::new(origin, direction, f32::INFINITY, TriangleId::NONE)
+        let mut in_scene = LatticeRay::new(origin, direction, f32::INFINITY, TriangleId::NONE);
+        in_scene.t_max = in_scene.not_below(ray.t_max);
+        in_scene
     }
 }
 

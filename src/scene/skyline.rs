@@ -153,7 +153,10 @@ mod tests {
 
     /// Asks for skylines of some of the mesh's patches, and traces rays that leave them.
     fn leave(name: &str, mesh: ControlMesh, rate: DicingRate, random: &mut Random, tally: &mut Tally) {
-        let world = World::new(vec![WorldMesh::new(mesh, DAffine3::IDENTITY, rate, 1).unwrap()]);
+        let turned = DAffine3::from_rotation_y(0.4) * DAffine3::from_scale(DVec3::splat(30.0));
+        let mirrored = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        let place = [DAffine3::IDENTITY, turned, mirrored][random.below(3)];
+        let world = World::new(vec![WorldMesh::new(mesh, place, rate, 1).unwrap()]);
         let cache = GridCache::new(&world, CacheConfig::with_bytes(16 << 20)).unwrap();
         let mesh = &world.meshes()[0];
         let patches: Vec<PatchId> = mesh.surface().visible_patches().collect();
@@ -188,14 +191,15 @@ mod tests {
                         let (mut builder, mut pin) = (Builder::default(), cache.segments().pin());
                         of_patch(of, &ray, &cache, &mut builder, &pin.visit())
                     });
-                    let lift = 2f64.powf(4.0 + 15.0 * random.unit());
+                    // From what a renderer's rays start above to the most that is allowed for.
+                    let lift = 2f64.powf(-8.0 + 27.0 * random.unit());
                     let (u, v) = (random.unit(), random.unit());
                     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
                     // Off the edges: above the surface, not where it is not known what is above.
                     let (u, v) = (0.01 + 0.97 * u, 0.01 + 0.97 * v);
-                    let origin = a + u * (b - a) + v * (c - a) + (8.0 + lift) * normal;
+                    let origin = a + u * (b - a) + v * (c - a) + lift * normal;
                     let cell = [i as u16, j as u16];
-                    let ask = Cleared { skyline: skyline.to_words(), direction, cell, lift: 9.0 + lift as f32 };
+                    let ask = Cleared { skyline: skyline.to_words(), direction, cell, lift: 1.001 * lift as f32 };
                     let lattice_from_world = mesh.lattice_from_world().inverse();
                     let from = PrimitiveRef { mesh: MeshId(0), patch, cell, half: half as u8 };
                     let ray = Ray::new(

@@ -12,9 +12,12 @@ use glam::{IVec3, Vec3};
 /// The least cosine of the angles between triangles of the sheet and the patch that is left.
 const LEAST_COSINE: f32 = 0.05;
 
-/// The least sine, roughly, of the angle between two edges of a triangle as n sees it: so that roundings of a triangle's rises are 2^-7 units of height over way at most,
-/// which the margins of `view.rs` allow for. (Edges are exact, their heights err by 2^-22 of 2^13 for each step, and their ways are some 2^6 for each step.)
-const LEAST_SINE: f32 = 1.0 / 256.0;
+/// By what a scalar product of three components errs at most, and what is made of two such, as a share of the greatest component and the sum of
+/// all lengths: 16 roundings of 2^-24.
+const ERROR: f32 = 1.0 / 1_048_576.0;
+
+/// Products of edges are exact up to there.
+const EXACT: f32 = 16_777_216.0;
 
 /// Some cells of a patch.
 #[derive(Clone, Copy)]
@@ -136,6 +139,10 @@ struct Axes<K: Kernel> {
     axes: [[K::F; 3]; 3],
     /// |n|^2 times the square of the least cosine.
     least: K::F,
+    /// What n's height of a triangle errs by at most, for each product of the lengths of its edges.
+    error_of_up: K::F,
+    /// The same for the products that its rises are made of.
+    error_of_rise: K::F,
 }
 
 impl<K: Kernel> Axes<K> {
@@ -145,7 +152,14 @@ impl<K: Kernel> Axes<K> {
         for (axis, of) in axes.iter_mut().zip(&frame.axes) {
             *axis = [k.splat(of.x), k.splat(of.y), k.splat(of.z)];
         }
-        Self { axes, least: k.splat(LEAST_COSINE * LEAST_COSINE * frame.axes[2].length_squared()) }
+        let [m_u, m_v, n] = frame.axes.map(|axis| axis.abs().max_element());
+        let m = m_u.max(m_v);
+        Self {
+            axes,
+            least: k.splat(LEAST_COSINE * LEAST_COSINE * frame.axes[2].length_squared()),
+            error_of_up: k.splat(ERROR * m * m),
+            error_of_rise: k.splat(ERROR * m * n),
+        }
     }
 
     /// A vector in the frame.
@@ -179,6 +193,12 @@ fn cross<K: Kernel>(k: K, a: [K::F; 3], b: [K::F; 3]) -> [K::F; 3] {
         k.sub(k.mul(a[2], b[0]), k.mul(a[0], b[2])),
         k.sub(k.mul(a[0], b[1]), k.mul(a[1], b[0])),
     ]
+}
+
+/// The sum of the components' magnitudes.
+#[inline(always)]
+fn length<K: Kernel>(k: K, [x, y, z]: [K::F; 3]) -> K::F {
+    k.add(k.add(k.abs(x), k.abs(y)), k.abs(z))
 }
 
 /// What is known of eight columns of cells.
@@ -219,18 +239,20 @@ impl<K: Kernel> Columns<K> {
         let ([xu, yu, zu], [xv, yv, zv]) = (axes.along(k, of_u), axes.along(k, of_v));
         let normal = cross(k, of_u, of_v);
         let length_squared = dot(k, normal, normal);
-        // The normal's height.
-        let (forth, back) = (k.mul(xu, yv), k.mul(yu, xv));
-        let up = k.sub(forth, back);
-        let zero = k.splat(0.0);
-        let is_wide = k.le(k.mul(k.add(k.abs(forth), k.abs(back)), k.splat(LEAST_SINE)), up);
-        let is_seen = is_wide & k.le(k.mul(length_squared, axes.least), k.mul(up, up)) & !k.le(up, zero);
-        let has_no_area = k.eq(length_squared, zero);
+        // The normal's height, and by what it may err.
+        let up = k.sub(k.mul(xu, yv), k.mul(yu, xv));
+        let lengths = k.mul(length(k, of_u), length(k, of_v));
+        let error = k.mul(lengths, axes.error_of_up);
+        let eight_errors = k.mul(error, k.splat(8.0));
+        let is_seen = k.le(eight_errors, up) & k.le(k.mul(length_squared, axes.least), k.mul(up, up));
+        let has_no_area = k.eq(length_squared, k.splat(0.0)) & k.le(lengths, k.splat(EXACT));
         // What the triangle rises along x and y; not a number, where it has no area.
         let x = k.div(k.sub(k.mul(zu, yv), k.mul(zv, yu)), up);
         let y = k.div(k.sub(k.mul(xu, zv), k.mul(xv, zu)), up);
-        steepest(k, [x, y], &mut self.steepness);
-        is_seen | has_no_area
+        let rises = k.add(k.abs(x), k.abs(y));
+        let errors = k.add(k.mul(error, rises), k.mul(lengths, k.add(axes.error_of_rise, axes.error_of_rise)));
+        steepest(k, [x, y], k.div(k.add(errors, errors), up), &mut self.steepness);
+        (is_seen & !k.le(up, k.splat(0.0))) | has_no_area
     }
 
     /// Gives the box around all columns.
@@ -264,5 +286,71 @@ impl<K: Kernel> Columns<K> {
                 *most = most.max(lanes[lane]);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::octants::octant;
+    use super::*;
+    use crate::grid::frame::{PackedFrame, axes};
+    use crate::grid::tests::support::Random;
+    use crate::grid::{CellRect, PieceLayout};
+    use crate::math::{LatticeGrid, simd};
+    use glam::{DVec2, DVec3};
+
+    /// The steepest of a triangle's directions in each octant, by exact edges.
+    fn steepness(frame: &Frame, [a, b, c]: [IVec3; 3]) -> Option<[f64; 8]> {
+        let along = |p: IVec3| {
+            let [x, y, z] = frame.axes.map(|axis| axis.as_dvec3().dot(p.as_dvec3()));
+            DVec3::new(x, y, z)
+        };
+        let (u, v) = (along(b - a), along(c - a));
+        let up = u.x * v.y - u.y * v.x;
+        let rises = DVec2::new(u.z * v.y - v.z * u.y, u.x * v.z - v.x * u.z) / up;
+        let mut steepest = [f64::MIN; 8];
+        for way in (0..64).map(|k| DVec2::from_angle(f64::from(k) * std::f64::consts::TAU / 64.0)) {
+            let in_octant = octant(way.abs().as_vec2().to_array(), way.to_array().map(|x| u32::from(x < 0.0)));
+            let steepness = &mut steepest[in_octant as usize];
+            *steepness = steepness.max(rises.dot(way) / way.abs().max_element());
+        }
+        (up > 0.0).then_some(steepest)
+    }
+
+    #[test]
+    fn triangles_are_no_steeper_than_was_measured_however_thin() {
+        let (mut random, mut n_thin) = (Random(0x7419), 0);
+        for k in 0..40_000 {
+            let size = 2f64.powf(1.0 + 21.0 * random.point(0.5).x.abs());
+            let Some([m_u, m_v]) = axes(random.point(1.0).as_vec3(), random.point(1.0).as_vec3()) else { continue };
+            let frame =
+                Frame { axes: [m_u, m_v, m_u.cross(m_v)], origin: IVec3::ZERO, lift: 0.0, packed: PackedFrame::NONE };
+            let along = random.point(size);
+            // Every other one is so thin that roundings decide on which side it is.
+            let aside = random.point(if k % 2 == 0 { size } else { 3.0 });
+            let corners = [DVec3::ZERO, along, along + aside, 2.0 * along + aside].map(|p| p.round().as_ivec3());
+            let points = corners.map(|corner| corner.to_array());
+            let vertices = LatticeGrid::from_points(&points, 2);
+            let layout = PieceLayout::new(&vertices, CellRect { i0: 0, j0: 0, i1: 1, j1: 1 }, [1, 1]);
+            let mut bytes = vec![0; layout.bytes()];
+            layout.encode(&vertices, &mut bytes);
+            let pieces = [PieceView::new(&bytes)];
+            let measured = simd::run(Measure { frame: &frame, pieces: &pieces, cells: [1, 1] });
+            let Some(Blocks { parts, are_seen: true, .. }) = measured else { continue };
+            let [a, b, c, d] = corners;
+            for triangle in [[a, b, c], [d, c, b]] {
+                if (triangle[1] - triangle[0]).as_dvec3().cross((triangle[2] - triangle[0]).as_dvec3()) == DVec3::ZERO {
+                    continue;
+                }
+                let exact = steepness(&frame, triangle).expect("a triangle that n sees");
+                let most = parts.map(|block| block.steepness);
+                for octant in 0..8 {
+                    let most = most.iter().fold(f32::MIN, |all, of| all.max(of[octant]));
+                    assert!(exact[octant] <= f64::from(most), "{triangle:?} in octant {octant}: {exact:?}, {most}");
+                }
+                n_thin += k % 2;
+            }
+        }
+        assert!(n_thin > 1000, "only {n_thin} thin ones");
     }
 }

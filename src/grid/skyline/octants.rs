@@ -112,16 +112,17 @@ impl<K: Kernel> Between<K> {
     }
 }
 
-/// Raises, octant by octant, how steep triangles are at most in the octant's directions, for triangles that rise by `x` along x and by `y` along y, one a lane.
+/// Raises, octant by octant, how steep triangles are at most in the octant's directions, for triangles that rise by `x` along x and by `y` along y, one
+/// a lane; `error` is by what both together may be greater.
 #[inline(always)]
-pub(super) fn steepest<K: Kernel>(k: K, [x, y]: [K::F; 2], all: &mut [K::F; 8]) {
+pub(super) fn steepest<K: Kernel>(k: K, [x, y]: [K::F; 2], error: K::F, all: &mut [K::F; 8]) {
     let zero = k.splat(0.0);
     let (minus_x, minus_y) = (k.sub(zero, x), k.sub(zero, y));
     let ahead = [x, y, minus_x, y, x, minus_y, minus_x, minus_y];
     let aside = [y, x, y, minus_x, minus_y, x, minus_y, minus_x];
     for octant in 0..8 {
         // Straight ahead, or as far aside as ahead. A triangle without area rises by no number, which is not greater.
-        let steepness = k.add(ahead[octant], k.max(aside[octant], zero));
+        let steepness = k.add(k.add(ahead[octant], k.max(aside[octant], zero)), error);
         all[octant] = k.max(steepness, all[octant]);
     }
 }
@@ -146,7 +147,8 @@ mod tests {
         for _ in 0..1000 {
             let rises = DVec2::new(random.point(3.0).x, random.point(3.0).y);
             let mut all = [Portable.splat(NOTHING); 8];
-            steepest(Portable, [rises.x as f32, rises.y as f32].map(|x| Portable.splat(x)), &mut all);
+            let of_lanes = [rises.x as f32, rises.y as f32].map(|x| Portable.splat(x));
+            steepest(Portable, of_lanes, Portable.splat(0.0), &mut all);
             let most = all.map(|lanes| f64::from(Portable.store(lanes)[3]));
             let mut seen = [f64::MIN; 8];
             for k in 0..80 {

@@ -72,7 +72,6 @@ impl SkylineSheet {
             let look = LookAround { from, within, patches: &patches, others: &others };
             let [near, far] = simd::run(look);
             if normals[number].iter().all(|normal| lets_pass(&near, *normal)) {
-                // What is no number stays: nobody clears it.
                 let higher = |[near, far]: [f32; 2]| if near > far { near } else { far };
                 let elevations = std::array::from_fn(|octant| higher([near[octant], far[octant]]));
                 parts.push(Part { number, from, elevations });
@@ -243,7 +242,7 @@ fn lets_pass(near: &[f32; 8], normal: Vec3) -> bool {
     let ways = [x.abs(), y.abs()];
     let octant = octant(ways, [x, y].map(|way| u32::from(way < 0.0)));
     let least = near[octant as usize];
-    // A triangle without area has no normal, and lets nobody start.
+    // Rays that start on a triangle without area, which has no normal, are not said to start above it.
     z == 0.0 || z > (least + MARGIN * least.abs() + MARGIN_OF_STEEPNESS) * ways[0].max(ways[1])
 }
 

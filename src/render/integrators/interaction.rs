@@ -44,7 +44,9 @@ impl<'a> Interaction<'a> {
         let side =
             if direction.dot(self.geometric_normal) >= 0.0 { self.point.clearance } else { -self.point.clearance };
         let origin = self.point.position + side * self.geometric_normal;
-        let above = Some(self.point.clearance as f32);
+        // A triangle without area has no normal that the origin could have been moved along.
+        let has_normal = self.hit.normal_in_object != DVec3::ZERO;
+        let above = has_normal.then_some(self.point.clearance as f32);
         Ray { from: Some(self.hit.primitive), above, ..Ray::new(origin, direction) }
     }
 
