@@ -3,8 +3,11 @@
 use crate::error::{Error, Result};
 use crate::ids::FaceId;
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
+
+/// Longest line in bytes, and one more: without a bound a device file would fill the memory.
+const MAX_LINE: u64 = 1 << 16;
 
 /// A place on a mesh's limit surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,17 +28,29 @@ pub fn read_sample_places(path: &Path) -> Result<Vec<SamplePlace>> {
     parse_sample_places(BufReader::new(file), path)
 }
 
-fn parse_sample_places(reader: impl BufRead, path: &Path) -> Result<Vec<SamplePlace>> {
-    let mut places = Vec::new();
-    for (i, line) in reader.lines().enumerate() {
-        let line = line.map_err(|e| Error::io("read", path, e))?;
-        let row = line.trim();
-        if row.is_empty() || row.starts_with('#') || (places.is_empty() && row.starts_with("face,sub,u,v")) {
-            continue;
+fn parse_sample_places(mut reader: impl BufRead, path: &Path) -> Result<Vec<SamplePlace>> {
+    let (mut places, mut line) = (Vec::new(), Vec::new());
+    for number in 1.. {
+        line.clear();
+        let n_read =
+            reader.by_ref().take(MAX_LINE).read_until(b'\n', &mut line).map_err(|e| Error::io("read", path, e))?;
+        if n_read == 0 {
+            break;
         }
-        places.push(parse_row(row).map_err(|message| Error::input(message).at(path, Some(i + 1)))?);
+        let place = parse_line(&line, places.is_empty());
+        places.extend(place.map_err(|message| Error::input(message).at(path, Some(number)))?);
     }
     Ok(places)
+}
+
+/// The place of a line, if it is not one to be passed over.
+fn parse_line(line: &[u8], may_be_header: bool) -> Result<Option<SamplePlace>, String> {
+    if line.len() as u64 == MAX_LINE {
+        return Err(format!("a line of {MAX_LINE} bytes and more; is this a table of face,sub,u,v?"));
+    }
+    let row = std::str::from_utf8(line).map_err(|_| "this is no text in UTF-8".to_owned())?.trim();
+    let is_header = may_be_header && row.starts_with("face,sub,u,v");
+    if row.is_empty() || row.starts_with('#') || is_header { Ok(None) } else { parse_row(row).map(Some) }
 }
 
 fn parse_row(row: &str) -> Result<SamplePlace, String> {
@@ -81,6 +96,13 @@ mod tests {
         for (text, expected) in cases {
             let message = parse(text).unwrap_err().to_string();
             assert!(message.starts_with(expected), "{text:?}: {message}");
+        }
+        for (text, expected) in [
+            (&b"0,0,0,0\n0,0,\xff,0\n"[..], "s.csv:2: this is no text in UTF-8"),
+            (&[b'1'; 1 << 17][..], "s.csv:1: a line of 65536 bytes and more"),
+        ] {
+            let message = parse_sample_places(text, Path::new("s.csv")).unwrap_err().to_string();
+            assert!(message.starts_with(expected), "{message}");
         }
     }
 }

@@ -43,7 +43,8 @@ fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
     // Temporary files are private by default; the finished picture has the rights the user's mask gives.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder_of(path))
+    // Without the name of a file that is nothing to the user.
+    builder.tempfile_in(folder_of(path)).map_err(|e| e.kind().into())
 }
 
 fn folder_of(path: &Path) -> PathBuf {

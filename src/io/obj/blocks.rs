@@ -123,11 +123,12 @@ impl<R: Read> Blocks<R> {
         let mut text = std::mem::take(&mut self.rest);
         // A line that is too long is a block that `LogicalLines` refuses.
         while text.len() < MAX_LINE {
+            let n_seen = text.len();
             text.reserve(self.block_bytes);
             if self.reader.by_ref().take(self.block_bytes as u64).read_to_end(&mut text)? == 0 {
                 break;
             }
-            if let Some(end) = end_of_last_line(&text) {
+            if let Some(end) = end_of_last_line(&text, n_seen) {
                 self.rest.extend_from_slice(&text[end..]);
                 text.truncate(end);
                 break;
@@ -139,11 +140,11 @@ impl<R: Read> Blocks<R> {
     }
 }
 
-/// Where the last line ends that is not continued.
-fn end_of_last_line(text: &[u8]) -> Option<usize> {
+/// Where the last line ends that is not continued, if it ends at `from` or after.
+fn end_of_last_line(text: &[u8], from: usize) -> Option<usize> {
     let is_end = |&i: &usize| {
         let line = text[..i].strip_suffix(b"\r").unwrap_or(&text[..i]);
         text[i] == b'\n' && line.last() != Some(&b'\\')
     };
-    (0..text.len()).rev().find(is_end).map(|i| i + 1)
+    (from..text.len()).rev().find(is_end).map(|i| i + 1)
 }

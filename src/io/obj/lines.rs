@@ -39,7 +39,8 @@ impl<R: BufRead> LogicalLines<R> {
         if !self.append_physical_line()? {
             return Ok(None);
         }
-        while self.buffer.last() == Some(&b'\\') {
+        // What looks like one in a comment is the end of a path on Windows.
+        while self.buffer.last() == Some(&b'\\') && !is_comment(&self.buffer) {
             *self.buffer.last_mut().expect("not empty") = b' ';
             self.append_physical_line()?;
         }
@@ -62,6 +63,10 @@ impl<R: BufRead> LogicalLines<R> {
         self.buffer.truncate(length_without_end(&self.buffer));
         Ok(n > 0)
     }
+}
+
+fn is_comment(line: &[u8]) -> bool {
+    line.trim_ascii_start().first() == Some(&b'#')
 }
 
 /// Length of a line without its final `\n` or `\r\n`.
@@ -93,6 +98,13 @@ mod tests {
         let text = b"a\\\n b \\\r\nc\r\nd\n\ne\\";
         let expected = [(1, "a  b  c"), (4, "d"), (5, ""), (6, "e ")].map(|(n, s)| (n, s.to_owned()));
         assert_eq!(lines_of(text), expected);
+    }
+
+    #[test]
+    fn comments_are_not_continued() {
+        let expected = [(1, "# C:\\models\\"), (2, "v 1"), (3, " #\\"), (4, "v 2 # x v 3")];
+        let text = b"# C:\\models\\\nv 1\n #\\\r\nv 2 # x\\\nv 3";
+        assert_eq!(lines_of(text), expected.map(|(n, s)| (n, s.to_owned())));
     }
 
     #[test]

@@ -72,10 +72,11 @@ pub fn read_obj_with(path: &Path, options: &ReadOptions<'_>) -> Result<ObjMesh> 
     let length = file.metadata().map_or(0, |m| m.len());
     let (exceeded, at_start) = (Cell::new(None), resident_bytes().unwrap_or(0));
     let watched = Watched { file, options, n_read: 0, next_look: LOOK_EVERY, exceeded: &exceeded };
+    let most_parsers = (length / blocks::BLOCK_BYTES as u64) as usize;
     let mesh = if options.n_threads < 2 || length < 2 * blocks::BLOCK_BYTES as u64 {
         parse_obj(BufReader::with_capacity(1 << 16, watched), path)
     } else {
-        blocks::parse_blocks(watched, path, options.n_threads, blocks::BLOCK_BYTES)
+        blocks::parse_blocks(watched, path, options.n_threads.min(most_parsers), blocks::BLOCK_BYTES)
     };
     mesh.map_err(|error| match exceeded.get() {
         None => error,
