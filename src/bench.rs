@@ -16,6 +16,7 @@
 
 use crate::io::process::thread_cpu;
 use crate::math::{Hit, Intersect, PrimitiveRef, Ray};
+use crate::parallel::on_threads;
 use crate::render::sampler::hash2;
 use crate::scene::camera::Camera;
 use glam::{DVec2, Vec3};
@@ -406,11 +407,7 @@ fn parallel<T, R: Send>(
         thread_cpu().as_secs_f64() - before
     };
     let start = Instant::now();
-    let cpu = std::thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(worker)).collect();
-        let own = worker();
-        own + others.into_iter().map(|w| w.join().unwrap_or_else(|p| std::panic::resume_unwind(p))).sum::<f64>()
-    });
+    let cpu = on_threads(threads, worker).iter().sum();
     (start.elapsed().as_secs_f64(), cpu)
 }
 

@@ -1,7 +1,9 @@
 //! Loops shared out among threads. Threads live as long as the loop.
 
 use std::ops::Range;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::ScopedJoinHandle;
 
 /// Items that one thread takes before it asks for more.
 pub const ITEMS_PER_TASK: usize = 4096;
@@ -31,14 +33,16 @@ pub fn for_each<T: Sync>(items: &[T], n_threads: usize, work: impl Fn(usize, &T)
     on_threads(n_threads.min(items.len()), worker);
 }
 
-/// Runs `worker` on `n_threads` threads, the caller's own among them.
-pub fn on_threads(n_threads: usize, worker: impl Fn() + Sync) {
+/// Runs `worker` on `n_threads` threads, the caller's own among them; returns what they return. Where the system refuses
+/// a thread there are fewer: a worker takes work until there is none.
+pub fn on_threads<R: Send>(n_threads: usize, worker: impl Fn() -> R + Sync) -> Vec<R> {
     std::thread::scope(|scope| {
-        for _ in 1..n_threads {
-            scope.spawn(&worker);
-        }
-        worker();
-    });
+        let spawn = |_| std::thread::Builder::new().spawn_scoped(scope, &worker).ok();
+        let others: Vec<_> = (1..n_threads).map_while(spawn).collect();
+        let own = worker();
+        let join = |other: ScopedJoinHandle<'_, R>| other.join().unwrap_or_else(|panic| resume_unwind(panic));
+        std::iter::once(own).chain(others.into_iter().map(join)).collect()
+    })
 }
 
 #[cfg(test)]

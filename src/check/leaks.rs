@@ -5,6 +5,7 @@ use super::targets::{Target, TargetFinder};
 use crate::ids::PatchId;
 use crate::math::{Intersect, Ray};
 use crate::mesh::shapes::noise::Random;
+use crate::parallel::on_threads;
 use crate::scene::world::WorldMesh;
 use glam::{DAffine3, DVec3};
 use serde::Serialize;
@@ -97,7 +98,7 @@ pub fn find_leaks<T: Intersect>(
             progress(done.fetch_add(n_rays, Ordering::Relaxed) + n_rays);
         }
     };
-    std::thread::scope(|scope| (0..settings.threads.max(1)).for_each(|_| drop(scope.spawn(work))));
+    on_threads(settings.threads, work);
     let mut reports = total.into_inner().expect("no thread panicked");
     reports.sort_by_key(|(task, _)| *task);
     reports.into_iter().fold(LeakReport::default(), |sum, (_, report)| sum.with(report))

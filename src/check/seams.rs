@@ -3,6 +3,7 @@
 use super::incidence::{EdgeRun, Incidence, SideRun, edge_rate, edge_runs, inner_sides};
 use super::window::{Vertex, Window};
 use crate::ids::FaceId;
+use crate::parallel::on_threads;
 use crate::scene::world::WorldMesh;
 use crate::subdiv::Dicer;
 use crate::subdiv::dice::snapped;
@@ -53,7 +54,7 @@ pub fn compare_seams(mesh: &WorldMesh, incidence: &Incidence, n_threads: usize, 
         }
         total.lock().expect("no thread panicked").add(comparer.report);
     };
-    std::thread::scope(|scope| (0..n_threads.max(1)).for_each(|_| drop(scope.spawn(work))));
+    on_threads(n_threads, work);
     let mut report = total.into_inner().expect("no thread panicked");
     report.examples.sort();
     report.examples.truncate(MAX_EXAMPLES);

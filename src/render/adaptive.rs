@@ -38,8 +38,9 @@ use super::reason::{PixelCounts, Reason};
 use super::settings::{Appearance, RenderSettings, RunSettings};
 use super::tiles::PixelRect;
 use super::tracer::Tracer;
-use super::workers::{Exposure, GroupSeconds, Rendered, TileQueue, in_threads, render};
+use super::workers::{Exposure, GroupSeconds, Rendered, TileQueue, render};
 use crate::ids::{MeshId, PatchId};
+use crate::parallel::on_threads;
 use crate::scene::camera::Camera;
 use crate::scene::world::World;
 use glam::Vec3;
@@ -73,7 +74,7 @@ pub fn render_adaptive<T: Tracer>(
     let scenery = Scenery::new(world, camera, settings);
     let job = Interpolation { camera, appearance, settings };
     let in_workers = |threads: usize, work: &(dyn Fn(&mut Worker<'_, '_, T>) + Sync)| {
-        let outcomes = in_threads(threads, || {
+        let outcomes = on_threads(threads, || {
             let mut tracer = make_tracer();
             let shader = Shader::new(&mut tracer, appearance, settings);
             let footprints = Footprints::new(&scenery);

@@ -1,6 +1,7 @@
 //! Patches of all meshes under one numbering, and work on them by all threads.
 
 use crate::ids::{MeshId, PatchId};
+use crate::parallel::on_threads;
 use crate::scene::world::World;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -66,12 +67,7 @@ impl PatchNumbers {
                 }
             }
         };
-        std::thread::scope(|scope| {
-            let threads: Vec<_> = (0..threads.clamp(1, n_tasks.max(1) as usize)).map(|_| scope.spawn(run)).collect();
-            let join =
-                |t: std::thread::ScopedJoinHandle<'_, S>| t.join().unwrap_or_else(|p| std::panic::resume_unwind(p));
-            threads.into_iter().map(join).collect()
-        })
+        on_threads(threads.min(n_tasks as usize), run)
     }
 
     fn task(&self, task: u32) -> Range<u32> {

@@ -18,7 +18,8 @@ use super::reason::{PixelCounts, Reason};
 use super::settings::{Appearance, RenderSettings, RunSettings};
 use super::tiles::PixelRect;
 use super::tracer::Tracer;
-use super::workers::{GroupSeconds, PixelTracer, Rendered, TileQueue, in_threads};
+use super::workers::{GroupSeconds, PixelTracer, Rendered, TileQueue};
+use crate::parallel::on_threads;
 use crate::scene::camera::Camera;
 use glam::{DVec2, Vec3};
 use parking_lot::Mutex;
@@ -66,7 +67,7 @@ pub fn render_thesis<T: Tracer>(
         Picture { groups: &groups, traced: &traced, settings, interpolation, background: appearance.background };
     let film = Mutex::new(Film::new(settings.window, &settings.aovs));
     let queue = TileQueue::new(settings.window, run.tile_side, run);
-    let counts = in_threads(run.threads, || picture.expose(&queue, &film));
+    let counts = on_threads(run.threads, || picture.expose(&queue, &film));
     let mut pixels = PixelCounts::default();
     counts.into_iter().for_each(|counts| pixels += counts);
     let film = film.into_inner();
@@ -104,7 +105,7 @@ fn trace<T: Tracer>(
 ) -> (Traced, RayCounts) {
     let next = AtomicUsize::new(0);
     let pixels = PixelTracer { camera, settings };
-    let results = in_threads(run.threads, || {
+    let results = on_threads(run.threads, || {
         let mut tracer = make_tracer();
         let mut shader = Shader::new(&mut tracer, appearance, settings);
         let mut records = Vec::new();

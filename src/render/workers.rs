@@ -10,6 +10,7 @@ use super::settings::{Appearance, Progress, RenderSettings, RunSettings};
 use super::tiles::{PixelRect, TileOrder};
 use super::tracer::{Built, Tracer};
 use crate::math::Ray;
+use crate::parallel::on_threads;
 use crate::scene::camera::Camera;
 use glam::{DVec2, DVec3, Vec3};
 use parking_lot::Mutex;
@@ -52,7 +53,7 @@ pub fn render<T: Tracer>(
     let film = Mutex::new(Film::new(settings.window, &settings.aovs));
     let queue = TileQueue::new(settings.window, run.tile_side, run);
     let pixels = PixelTracer { camera, settings };
-    let counts = in_threads(run.threads, || {
+    let counts = on_threads(run.threads, || {
         let mut tracer = make_tracer();
         let mut shader = Shader::new(&mut tracer, appearance, settings);
         let mut records = Vec::with_capacity((run.tile_side as usize).pow(2).min(settings.window.n_pixels()));
@@ -71,17 +72,6 @@ pub fn render<T: Tracer>(
     let mut pixels = PixelCounts::default();
     pixels.add(Reason::Every, film.n_done() as u64);
     Rendered { complete: film.n_done() == settings.window.n_pixels(), film, rays, pixels, seconds: Default::default() }
-}
-
-/// Runs `work` on `threads` threads; returns what they return.
-pub(super) fn in_threads<R: Send>(threads: usize, work: impl Fn() -> R + Sync) -> Vec<R> {
-    std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(&work)).collect();
-        let join = |worker: std::thread::ScopedJoinHandle<'_, R>| {
-            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        workers.into_iter().map(join).collect()
-    })
 }
 
 /// Hands out tiles until there are no more, or the render is cancelled.

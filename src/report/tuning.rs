@@ -2,6 +2,7 @@
 
 use super::quantity::{Bytes, Count};
 use crate::cache::{CacheStatistics, Policy, Reinsert, Replay, TraceLog};
+use crate::parallel::on_threads;
 use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -84,6 +85,10 @@ pub struct Tuning {
     pub best_segments: (usize, f64),
 }
 
+/// Sizes that are replayed, at least: with less, what rays hold at the moment is a good part of the cache, and what several
+/// threads have of it, which a replay by one thread does not know.
+const LEAST_SIZE: usize = 64 << 10;
+
 /// From hit rates to seconds.
 #[derive(Clone, Copy)]
 struct TimeModel {
@@ -115,9 +120,14 @@ impl Tuning {
         };
         let working_set = replay.working_set_bytes();
         let unbounded = time.seconds(replay.run(AS_BUILT, enough_for(working_set)).hit_rate());
-        let sizes: Vec<usize> = (0..N_SIZES).rev().map(|k| size_below(working_set, k)).collect();
+        let mut sizes: Vec<usize> = (0..N_SIZES).rev().map(|k| size_below(working_set, k)).collect();
+        sizes.retain(|&bytes| bytes >= LEAST_SIZE);
+        sizes.dedup();
+        if sizes.is_empty() {
+            sizes.push(LEAST_SIZE);
+        }
         let curve = points(&replay, &sizes, counters.lookups, &time, render.threads);
-        let recommended = smallest_within(&replay, &time, TOLERATED_SLOWNESS * unbounded, &curve);
+        let recommended = smallest_within(&replay, &time, TOLERATED_SLOWNESS * unbounded, &curve).max(LEAST_SIZE);
         Self {
             input,
             lookups: counters.lookups,
@@ -156,10 +166,7 @@ fn points(replay: &Replay, sizes: &[usize], lookups: u64, time: &TimeModel, thre
         }
         done
     };
-    let mut points: Vec<CurvePoint> = std::thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads.min(sizes.len())).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().flat_map(|w| w.join().unwrap_or_else(|p| std::panic::resume_unwind(p))).collect()
-    });
+    let mut points = on_threads(threads.min(sizes.len()), work).concat();
     points.sort_by_key(|p| p.cache_bytes);
     points
 }
