@@ -271,13 +271,13 @@ impl Ring {
     /// A segment of a sample may be smaller than a block: what a block has too much is taken from the next ones, so
     /// that the mean is right. The gap at the end of a real segment is half a block, and as much of the sample's time.
     fn begin_segment(&mut self) {
-        while self.used >= self.segment_lines || !self.is_sample {
+        if self.is_sample {
+            let n_full = (self.used / self.segment_lines).floor();
+            self.head += n_full as u64;
+            self.used -= n_full * self.segment_lines;
+        } else {
             self.head += 1;
-            if !self.is_sample {
-                self.used = 0.0;
-                return;
-            }
-            self.used -= self.segment_lines;
+            self.used = 0.0;
         }
     }
 }

@@ -4,17 +4,20 @@
 //! follow these, so that the list also tells who is whose parent. Where the list would become too long, only a
 //! **sample** is kept: all accesses to a share of the root slots and to what is below them, chosen by hash (SHARDS:
 //! Waldspurger et al., FAST 2015). A cache with the same share of the bytes treats the sample nearly as the whole cache
-//! treats all.
+//! treats all. Of so few roots that a share of them tells nothing, the first accesses are kept instead.
 
 use super::block::Block;
 use super::word::{MAX_BLOCK_LINES, WORDS_PER_LINE};
 use parking_lot::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
+use rustc_hash::FxHashSet;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Bits of a block's hash.
 const KEY_BITS: u32 = 51;
 /// Levels of blocks below a root: three bits.
 const MAX_LEVELS: usize = 8;
+/// Roots that a sample has at least.
+const LEAST_ROOTS: usize = 64;
 /// Accesses that a thread collects before it adds them to the trace.
 const BATCH: usize = 4096;
 
@@ -51,6 +54,8 @@ pub struct TraceLog {
     accesses: Mutex<Vec<Access>>,
     /// Roots whose hash is below this are in the sample.
     first_left_out: AtomicU64,
+    /// Whether no more is recorded.
+    is_full: AtomicBool,
 }
 
 impl std::fmt::Debug for Recorder<'_> {
@@ -62,12 +67,23 @@ impl std::fmt::Debug for Recorder<'_> {
 impl TraceLog {
     /// An empty trace that keeps at most about `limit` accesses, 8 bytes each.
     pub fn new(limit: usize) -> Self {
-        Self { limit, accesses: Mutex::default(), first_left_out: AtomicU64::new(1 << KEY_BITS) }
+        Self {
+            limit,
+            accesses: Mutex::default(),
+            first_left_out: AtomicU64::new(1 << KEY_BITS),
+            is_full: AtomicBool::new(false),
+        }
     }
 
     /// A thread's way to add to the trace.
     pub fn recorder(&self) -> Recorder<'_> {
-        Recorder { log: self, first_left_out: self.bound(), is_kept: false, keys: [0; MAX_LEVELS], batch: Vec::new() }
+        Recorder {
+            log: self,
+            first_left_out: self.bound_of_recorders(),
+            is_kept: false,
+            keys: [0; MAX_LEVELS],
+            batch: Vec::new(),
+        }
     }
 
     /// The share of all roots that is in the sample.
@@ -93,16 +109,36 @@ impl TraceLog {
         self.first_left_out.load(Ordering::Relaxed)
     }
 
-    /// Adds accesses that begin with one to a root; halves the sample for as long as it is too large.
+    /// Adds accesses that begin with one to a root. Where they become too many, the sample is halved for as long as it has roots
+    /// enough, then nothing more is recorded: the beginning of a render stands for all of it better than a root or two for all roots.
     fn add(&self, batch: &mut Vec<Access>) {
         let mut accesses = self.accesses.lock();
+        if self.is_full.load(Ordering::Relaxed) {
+            batch.clear();
+            return;
+        }
         keep_roots_below(batch, self.bound());
         accesses.append(batch);
-        while accesses.len() > self.limit && self.bound() > 1 {
+        while accesses.len() > self.limit {
+            if n_roots(&accesses) < 2 * LEAST_ROOTS {
+                self.is_full.store(true, Ordering::Relaxed);
+                accesses.truncate(self.limit);
+                return;
+            }
             self.first_left_out.store(self.bound() / 2, Ordering::Relaxed);
             keep_roots_below(&mut accesses, self.bound());
         }
     }
+
+    /// What recorders leave out from: all, once the trace is full.
+    fn bound_of_recorders(&self) -> u64 {
+        if self.is_full.load(Ordering::Relaxed) { 0 } else { self.bound() }
+    }
+}
+
+fn n_roots(accesses: &[Access]) -> usize {
+    let roots = accesses.iter().filter(|access| access.level() == 0);
+    roots.map(|access| access.key()).collect::<FxHashSet<_>>().len()
 }
 
 /// Leaves out roots from this hash on, and what follows them.
@@ -161,7 +197,7 @@ impl Recorder<'_> {
     #[cold]
     fn flush(&mut self) {
         self.log.add(&mut self.batch);
-        self.first_left_out = self.log.bound();
+        self.first_left_out = self.log.bound_of_recorders();
     }
 }
 
@@ -176,4 +212,35 @@ fn hash(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     (x ^ (x >> 31)) >> (64 - KEY_BITS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A log of so many accesses to so many roots, in turns.
+    fn log_of(n: usize, n_roots: u64, limit: usize) -> TraceLog {
+        let log = TraceLog::new(limit);
+        for first in (0..n).step_by(BATCH) {
+            let access = |i: usize| Access::new(hash(i as u64 % n_roots), 0, 1);
+            log.add(&mut (first..n.min(first + BATCH)).map(access).collect());
+        }
+        log
+    }
+
+    #[test]
+    fn many_roots_are_sampled_and_few_are_kept_for_a_while() {
+        let many = log_of(200_000, 10_000, 20_000);
+        assert!(
+            many.len() <= 20_000 && many.len() > 5_000 && many.share() < 0.25,
+            "{} of {}",
+            many.len(),
+            many.share()
+        );
+        for n_roots in [1, 6, 100] {
+            let few = log_of(200_000, n_roots, 20_000);
+            assert_eq!((few.len(), few.share()), (20_000, 1.0), "{n_roots} roots");
+            assert!(few.recorder().first_left_out == 0, "nothing more is recorded");
+        }
+    }
 }
