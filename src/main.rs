@@ -1,12 +1,11 @@
 //! The lazytess command.
 
-use clap::Parser;
 use lazytess::cli::{Cli, describe};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     // Clap prints help to stdout with code 0, and bad usage to stderr with code 2.
-    match Cli::parse().run() {
+    match Cli::typed().run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("{}", describe(&error));

@@ -51,6 +51,13 @@ fn the_whole_process_stays_within_its_budget() {
     }
 }
 
+/// The size that a refusal names.
+fn named_by(refusal: &str) -> String {
+    let size = refusal.split("; ").nth(1).and_then(|rest| rest.split_whitespace().next()).expect("a size is named");
+    assert!(size.ends_with('M'), "{refusal}");
+    size.to_owned()
+}
+
 #[test]
 fn too_small_a_budget_is_refused_with_one_that_does() {
     let folder = folder_with_ground("40k");
@@ -58,13 +65,62 @@ fn too_small_a_budget_is_refused_with_one_that_does() {
         let refusal = lazytess(folder.path(), &[&RENDER[..], &["--memory", budget]].concat()).code(2);
         String::from_utf8(refusal.get_output().stderr.clone()).unwrap()
     };
-    let message = refused("12M");
-    let named = message.split("; ").nth(1).and_then(|rest| rest.split_once(" would do")).expect("a size is named").0;
-    let statistics = render_within(folder.path(), named);
-    let budget = named.trim_end_matches('M').parse::<f64>().unwrap() * (1 << 20) as f64;
+    let named = named_by(&refused("12M"));
+    assert!(!folder.path().join("g.exr").exists(), "refused before anything is rendered");
+    let statistics = render_within(folder.path(), &named);
+    let budget = named.trim_end_matches('M').parse::<f64>().unwrap() * f64::from(1 << 20);
     assert!(statistics["memory"]["peak_resident_bytes"].as_f64().unwrap() <= 1.05 * budget);
     assert!(refused("1M").contains("of the file fill it; all of it takes"));
-    assert!(!folder.path().join("none.exr").exists());
+}
+
+#[test]
+fn plans_and_large_rings_are_within_the_budget_too() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("creased.obj"), creased_grid(60)).unwrap();
+    lazytess(folder.path(), &["generate", "n-gon", "--valence", "500", "-o", "n-gon.obj", "--quiet"]).success();
+    for mesh in ["creased.obj", "n-gon.obj"] {
+        let render = |budget: &str| {
+            let options = ["render", mesh, "-o", "m.png", "--size", "60x40", "--threads", "2", "--quiet"];
+            lazytess(folder.path(), &[&options[..], &["--stats", "m.json", "--memory", budget]].concat())
+        };
+        // What plans take is known only when they are made: the size named first may be refused in its turn.
+        let mut named = "16M".to_owned();
+        let mut n_refusals = 0;
+        loop {
+            let output = render(&named).get_output().clone();
+            if output.status.success() {
+                break;
+            }
+            assert_eq!(output.status.code(), Some(2));
+            named = named_by(&String::from_utf8(output.stderr).unwrap());
+            n_refusals += 1;
+        }
+        assert!((1..4).contains(&n_refusals), "{mesh}: {n_refusals} refusals");
+        let statistics: Value = serde_json::from_slice(&std::fs::read(folder.path().join("m.json")).unwrap()).unwrap();
+        let budget = named.trim_end_matches('M').parse::<f64>().unwrap() * f64::from(1 << 20);
+        let peak = statistics["memory"]["peak_resident_bytes"].as_f64().unwrap();
+        assert!(peak <= 1.05 * budget, "{mesh}: {peak} of {budget}");
+    }
+}
+
+/// A plane of n x n quads, all of whose edges are semi-sharp, each in its own way: no two rings are equal.
+fn creased_grid(n: usize) -> String {
+    let number = |i: usize, j: usize| j * (n + 1) + i;
+    let mut text = String::new();
+    for (j, i) in (0..=n).flat_map(|j| (0..=n).map(move |i| (j, i))) {
+        text += &format!("v {i} {} {j}\n", (i * j) % 7);
+    }
+    for (j, i) in (0..n).flat_map(|j| (0..n).map(move |i| (j, i))) {
+        let corners =
+            [number(i, j), number(i, j + 1), number(i + 1, j + 1), number(i + 1, j)].map(|v| (v + 1).to_string());
+        text += &format!("f {}\n", corners.join(" "));
+        let sharpness = |k: usize| 0.1 + ((k * 7919) % 4999) as f64 / 1000.0;
+        let along = [(number(i + 1, j), 2 * number(i, j)), (number(i, j + 1), 2 * number(i, j) + 1)];
+        for (end, k) in along {
+            text += &format!("t crease 2/1/0 {} {end} {}\n", number(i, j), sharpness(k));
+        }
+    }
+    text
 }
 
 /// Bytes of address space that are mapped and hardly ever resident: program and libraries, stacks of threads.

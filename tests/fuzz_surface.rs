@@ -3,13 +3,15 @@
 //! `LAZYTESS_FUZZ=START..END cargo test --test fuzz_surface` tries other seeds. A failure is shrunk and printed as a test.
 
 use glam::DVec3;
-use lazytess::ids::FaceId;
+use lazytess::ids::{FaceId, PatchId};
+use lazytess::math::LatticeGrid;
 use lazytess::mesh::ControlMesh;
 use lazytess::mesh::random::{random_edits, random_mesh};
 use lazytess::mesh::shrink::{as_test, shrink};
+use lazytess::subdiv::dice::LATTICE_SHIFT;
 use lazytess::subdiv::refine::{RefinedMesh, Sample, Tangents};
 use lazytess::subdiv::surface::PatchPoints;
-use lazytess::subdiv::{Evaluator, SampleKind, Surface, SurfaceSample};
+use lazytess::subdiv::{Dicer, Evaluator, PatchRates, SampleKind, Surface, SurfaceSample, snapped};
 
 /// Where to compare.
 #[derive(Clone, Copy)]
@@ -104,6 +106,9 @@ fn compare(mesh: &ControlMesh, places: Places) -> Option<String> {
         let face = FaceId::from(face);
         for sub in 0..if size == 4 { 1 } else { size } {
             let patch = surface.patch_of(face, sub);
+            if let Some(why) = diced_differs(&surface, patch, &mut points, &mut evaluator) {
+                return Some(format!("face {face}, sub {sub}: {why}"));
+            }
             for (uv, exact) in places.points.iter().zip(reference.limits_at(face, sub, places.points)) {
                 let hidden = surface.edited().hide_point(patch, uv[0], uv[1]);
                 if exact.is_some() == (hidden || !surface.is_visible(patch)) {
@@ -123,6 +128,59 @@ fn compare(mesh: &ControlMesh, places: Places) -> Option<String> {
         }
     }
     None
+}
+
+/// Vertices of a patch's grids are the surface's points, rounded to the lattice: half a step away, and a step where rounding is
+/// left to the owner of a border.
+fn diced_differs(
+    surface: &Surface,
+    patch: PatchId,
+    points: &mut PatchPoints,
+    evaluator: &mut Evaluator,
+) -> Option<String> {
+    if !surface.is_visible(patch) {
+        return None;
+    }
+    let (mut dicer, mut grid) = (Dicer::default(), LatticeGrid::default());
+    for n in [8, 12] {
+        let rates = surface.uniform_rates(patch, n);
+        dicer.dice(surface, patch, &rates, [0, rates.n_u], [0, rates.n_v], &mut grid);
+        surface.load(patch, points);
+        for (k, vertex) in grid.points().enumerate() {
+            let [i, j] = [k as u32 % (rates.n_u + 1), k as u32 / (rates.n_u + 1)];
+            let [u, v] = place_of(&rates, i, j);
+            if surface.edited().hide_point(patch, u, v) {
+                continue;
+            }
+            let exact = surface.sample(points, evaluator, u, v).position;
+            let away = (DVec3::from_array(vertex.map(f64::from)) - LATTICE_SHIFT - exact).abs().max_element();
+            if away.is_nan() || away > 1.0 {
+                return Some(format!("vertex {i}, {j} at rate {n} is {away} steps away"));
+            }
+        }
+    }
+    None
+}
+
+/// Where vertex (i, j) of a grid is; on a side with fewer segments at one of its points.
+fn place_of(rates: &PatchRates, i: u32, j: u32) -> [f64; 2] {
+    let along = |i: u32, n: u32, rate: u32| f64::from(snapped(i, n, rate)) / f64::from(rate);
+    let PatchRates { sides, n_u, n_v, .. } = *rates;
+    let rate_of_u = if j == 0 {
+        sides[0]
+    } else if j == n_v {
+        sides[2]
+    } else {
+        n_u
+    };
+    let rate_of_v = if i == n_u {
+        sides[1]
+    } else if i == 0 {
+        sides[3]
+    } else {
+        n_v
+    };
+    [along(i, n_u, rate_of_u), along(j, n_v, rate_of_v)]
 }
 
 /// Derivatives may differ by 1e-4 of their length, or of `short` where that is more; directions by 1e-4.

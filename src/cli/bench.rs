@@ -2,8 +2,9 @@
 
 use super::camera::CameraArgs;
 use super::input::EditArgs;
+use super::outputs::check_outputs;
 use super::run_options::RunArgs;
-use super::values::{count, picture_size};
+use super::values::{count, fixed_rate, picture_size};
 use super::{PICTURE, stdout};
 use crate::bench::{Bench, BenchHit, BenchResult, BenchSettings, face_parameters};
 use crate::cache::{CacheConfig, CacheStatistics};
@@ -34,7 +35,7 @@ pub struct BenchArgs {
     #[arg(value_name = "MESH.obj")]
     mesh: PathBuf,
     /// Segments that every edge of a quad is cut into, 1 to 4096
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = PICTURE)]
+    #[arg(long, value_name = "N", value_parser = fixed_rate, help_heading = PICTURE)]
     rate: u32,
     /// Picture size in pixels
     #[arg(long, default_value = "800x600", value_name = "WxH", value_parser = picture_size, help_heading = PICTURE)]
@@ -47,7 +48,7 @@ pub struct BenchArgs {
     #[arg(long, value_delimiter = ',', default_value = "primary,ao,diffuse", value_name = "LIST")]
     rays: Vec<RayKind>,
     /// Ambient occlusion rays at each hit
-    #[arg(long, default_value_t = 8, value_name = "N")]
+    #[arg(long, default_value_t = 8, value_name = "N", value_parser = clap::value_parser!(u32).range(..=4096))]
     ao: u32,
     /// Hand secondary rays over N at a time, for the tracer to put into an order of its own; 0: one by one, as given
     #[arg(long, default_value_t = 0, value_name = "N")]
@@ -110,6 +111,7 @@ struct Report {
 impl BenchArgs {
     /// Measures and prints.
     pub fn run(&self) -> Result<()> {
+        check_outputs(&[self.hits.as_deref()], &[&self.mesh])?;
         let mesh = rounded_to_f32(self.edits.load_mesh(&self.mesh)?);
         let (faces, verts, bounds) = (mesh.n_faces(), mesh.positions.len(), mesh.bounds());
         let description = self.camera.apply(CameraDescription::framing(bounds))?;
@@ -132,7 +134,7 @@ impl BenchArgs {
         let world = World::new(vec![WorldMesh::new(mesh, DAffine3::IDENTITY, rate, threads)?]);
         let (build_s, build_cpu_s) = watch.seconds();
         let full = world.full_tessellation(threads);
-        let capacity = self.run.cache().capacity(full.bytes as usize * 2 + (64 << 20));
+        let capacity = self.run.cache().capacity(full.most_bytes());
         let cache = GridCache::new(&world, CacheConfig { capacity, ..CacheConfig::with_bytes(0) })?;
         let result = bench.run(|| Intersector::new(&world, &cache), |hit| bench_hit(&world, hit));
         let counters = cache.segments().statistics();

@@ -4,8 +4,8 @@ use super::input::EditArgs;
 use super::interrupt::cancel_on_interrupt;
 use super::progress::Progress;
 use super::run_options::RunArgs;
-use super::values::{CacheSize, positive, vector};
-use super::{SPEED, stdout};
+use super::stdout;
+use super::values::{decimal_count, positive, vector};
 use crate::cache::CacheConfig;
 use crate::check::{Incidence, LeakReport, LeakSettings, SeamReport, compare_seams, find_leaks};
 use crate::error::{Error, ErrorKind, Result};
@@ -35,7 +35,7 @@ pub struct CheckArgs {
     #[command(flatten)]
     pub edits: EditArgs,
     /// How many rays to aim
-    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    #[arg(long, value_name = "N", default_value = "1M", value_parser = decimal_count)]
     pub rays: u64,
     /// Pieces for each edge: the same for all, or random ones from 1 to 1000 that differ from edge to edge
     #[arg(long, value_name = "N|random:SEED", default_value = "8")]
@@ -52,15 +52,9 @@ pub struct CheckArgs {
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
-    /// Memory for tessellated patches; any size works, 0 included
-    #[arg(long, value_name = "SIZE", default_value = "256M", help_heading = SPEED)]
-    pub cache: CacheSize,
-    /// Worker threads [default: one for each processor]
-    #[arg(long, value_name = "N", value_parser = super::values::count, help_heading = SPEED)]
-    pub threads: Option<u32>,
-    /// No progress bar
-    #[arg(long, short, help_heading = SPEED)]
-    pub quiet: bool,
+    /// Speed
+    #[command(flatten)]
+    pub run: RunArgs,
 }
 
 /// Rates of the edges under test.
@@ -105,7 +99,7 @@ impl CheckArgs {
     /// Checks, prints, and fails if something is wrong.
     pub fn run(&self) -> Result<()> {
         let cancel = cancel_on_interrupt()?;
-        let threads = self.threads.map_or_else(RunArgs::available_threads, |n| n as usize);
+        let threads = self.run.threads();
         let mesh = self.edits.load_mesh(&self.mesh)?;
         let description = DescribedMesh::of(&mesh);
         let world_from_object =
@@ -126,10 +120,9 @@ impl CheckArgs {
     }
 
     fn trace(&self, world: &World, incidence: &Incidence, threads: usize, cancel: &AtomicBool) -> Result<LeakReport> {
-        let full = world.full_tessellation(threads);
-        let capacity = self.cache.capacity(2 * full.bytes as usize + (64 << 20));
+        let capacity = self.run.cache().capacity(world.full_tessellation(threads).most_bytes());
         let cache = GridCache::new(world, CacheConfig { capacity, ..CacheConfig::with_bytes(0) })?;
-        let progress = Progress::new("rays", self.quiet);
+        let progress = Progress::new("rays", self.run.quiet);
         let settings = LeakSettings { rays: self.rays, seed: self.seed, threads };
         let report = |done: u64| progress.set(done as usize, self.rays as usize);
         let make_tracer = || Intersector::new(world, &cache);

@@ -1,9 +1,10 @@
 //! `lazytess compare`: how far one picture is from another.
 
+use super::outputs::check_outputs;
 use super::stdout::print;
 use super::values::display_units;
 use crate::error::{Error, ErrorKind, Result};
-use crate::image::difference::DifferenceMap;
+use crate::image::difference::{DifferenceMap, is_above};
 use crate::image::display::display_value;
 use crate::image::{Comparison, LinearImage, compare};
 use crate::io::picture::{RgbPicture, read_rgb};
@@ -34,6 +35,9 @@ pub struct CompareArgs {
 impl CompareArgs {
     /// Compares, prints, and judges if asked to.
     pub fn run(&self) -> Result<()> {
+        if let Some(path) = &self.diff {
+            check_outputs(&[Some(path)], &[&self.a, &self.b])?;
+        }
         let (a, b) = (read_rgb(&self.a)?, read_rgb(&self.b)?);
         let (comparison, map) = compare(borrow(&a)?, borrow(&b)?)?;
         let json = serde_json::to_string_pretty(&comparison).expect("plain numbers have a JSON form");
@@ -51,7 +55,7 @@ impl CompareArgs {
 
     fn judge(&self, comparison: &Comparison, map: &DifferenceMap) -> Result<()> {
         let limit = self.max.unwrap_or(f32::INFINITY);
-        if comparison.max <= limit {
+        if !is_above(comparison.max, limit) {
             return Ok(());
         }
         let (share, max) = (100.0 * map.share_above(limit), comparison.max);

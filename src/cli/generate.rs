@@ -1,7 +1,9 @@
 //! `lazytess generate`: control meshes of this program's making, as OBJ.
 
 use super::interrupt::cancel_on_interrupt;
+use super::outputs::check_outputs;
 use super::progress::Progress;
+use super::values::decimal_count;
 use crate::error::{Error, ErrorKind, Result};
 use crate::ids::VertexId;
 use crate::io::obj_write::{ObjWriter, write_obj};
@@ -27,7 +29,7 @@ pub struct GenerateArgs {
     #[arg(short, long, value_name = "OUT.obj")]
     output: PathBuf,
     /// About how many faces (ground, scan, crowd); reads like 5000, 20k or 10M (decimal) [default: 10k]
-    #[arg(long, value_name = "N", value_parser = parse_count)]
+    #[arg(long, value_name = "N", value_parser = decimal_count)]
     faces: Option<u64>,
     /// Which of the meshes of that kind (ground, scan, crowd) [default: 1]
     #[arg(long, value_name = "N")]
@@ -47,7 +49,7 @@ const DEFAULT_FACES: u64 = 10_000;
 const MAX_FACES: u64 = 500_000_000;
 
 /// Larger polygons and poles mean nothing that smaller ones do not.
-const MAX_VALENCE: u32 = 1_000_000;
+const MAX_VALENCE: u32 = ControlMesh::MOST_CORNERS;
 
 /// What to write, checked.
 enum Job {
@@ -60,6 +62,7 @@ enum Job {
 impl GenerateArgs {
     /// Writes the mesh.
     pub fn run(&self) -> Result<()> {
+        check_outputs(&[Some(&self.output)], &[])?;
         let job = self.job()?;
         let comment = format!("made by: lazytess generate {}", self.arguments());
         let progress = Progress::new("faces", self.quiet || matches!(job, Job::Mesh(_)));
@@ -183,31 +186,5 @@ impl<W: io::Write> MeshSink for Watched<'_, W> {
 
     fn corner(&mut self, corner: Corner) -> io::Result<()> {
         self.writer.corner(corner)
-    }
-}
-
-/// A number of things, with `k` for thousands and `M` for millions.
-fn parse_count(text: &str) -> Result<u64, String> {
-    let (digits, unit) = match text.char_indices().next_back() {
-        Some((end, 'k')) => (&text[..end], 1000),
-        Some((end, 'M')) => (&text[..end], 1_000_000),
-        _ => (text, 1),
-    };
-    let count = digits.parse::<u64>().ok().and_then(|n| n.checked_mul(unit));
-    count.ok_or_else(|| "write a number such as 5000, 20k or 10M".to_owned())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn counts_have_decimal_units() {
-        assert_eq!(parse_count("5000"), Ok(5000));
-        assert_eq!(parse_count("20k"), Ok(20_000));
-        assert_eq!(parse_count("10M"), Ok(10_000_000));
-        for bad in ["", "k", "-1", "1.5M", "99999999999999999999", "9999999999999999M", "10é"] {
-            assert!(parse_count(bad).is_err(), "{bad}");
-        }
     }
 }

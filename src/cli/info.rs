@@ -4,7 +4,6 @@ use super::input::{load_scene, settle_rates};
 use super::picture::PictureArgs;
 use super::run_options::RunArgs;
 use super::stdout;
-use crate::cache::CacheConfig;
 use crate::error::Result;
 use crate::io::process::available_bytes;
 use crate::report::{CacheAdvice, Inventory};
@@ -52,7 +51,7 @@ impl InfoArgs {
         let meshes = render.read_meshes(threads, false)?;
         meshes.iter().for_each(|mesh| inventory.add_control_mesh(mesh));
         let (world, _) = render.compile(meshes, threads, false)?;
-        let slots = GridCache::new(&world, CacheConfig::with_bytes(0))?.table_bytes();
+        let slots = GridCache::table_bytes_for(&world);
         inventory.add_world(&world, slots, threads);
         let pixels = settings.window.n_pixels() as u64;
         inventory.cache = CacheAdvice::new(&inventory.full, pixels, available_bytes());

@@ -5,12 +5,13 @@ use super::input::EditArgs;
 use super::progress::Progress;
 use super::values::CacheSize;
 use crate::cache::CacheConfig;
-use crate::error::Result;
+use crate::error::{Error, ErrorKind, Result};
 use crate::io::obj::ReadOptions;
 use crate::io::process::{self, Stopwatch};
 use crate::mesh::ControlMesh;
+use crate::render::Film;
 use crate::render::adaptive::render_adaptive;
-use crate::render::budget::{RenderNeeds, too_small};
+use crate::render::budget::{RenderNeeds, too_small_for};
 use crate::render::item_buffer::ItemBuffer;
 use crate::render::settings::{self, Appearance, Groups, RenderSettings, RunSettings};
 use crate::render::thesis::{Interpolation, render_thesis};
@@ -65,19 +66,34 @@ impl<'a> RenderScene<'a> {
         let control_faces = meshes.iter().map(ControlMesh::n_faces).sum();
         let mut seconds = PhaseSeconds { load: watch.seconds().into(), ..Default::default() };
         let watch = Stopwatch::start();
-        if let Some(budget) = self.memory {
-            self.check_budget(budget, &meshes, threads)?;
-        }
+        self.check_film()?;
+        self.check_budget(&meshes, threads)?;
         let (world, camera) = self.compile(meshes, threads, quiet)?;
         seconds.prepare = watch.seconds().into();
         Ok(Prepared { scene: self.scene, settings: self.settings, world, camera, control_faces, seconds })
     }
 
-    /// Refuses a budget that preparing and tracing these meshes would certainly exceed.
-    fn check_budget(&self, budget: u64, meshes: &[ControlMesh], threads: usize) -> Result<()> {
+    /// Refuses a picture that the machine has no memory for.
+    fn check_film(&self) -> Result<()> {
+        let film = Film::n_bytes(self.settings.window, &self.settings.aovs) as u64;
+        match process::available_bytes() {
+            Some(available) if film > available => {
+                let [film, available] = [film, available].map(|bytes| bytes.div_ceil(1 << 20));
+                let message =
+                    format!("the picture takes {film} MiB, {available} are available: make it smaller, or use --crop");
+                Err(Error::new(ErrorKind::Budget, message))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses a budget that preparing and tracing these meshes would certainly exceed, whatever their plans take.
+    fn check_budget(&self, meshes: &[ControlMesh], threads: usize) -> Result<()> {
+        let Some(budget) = self.memory else { return Ok(()) };
         process::give_back_freed_memory();
         let mut held = process::resident_bytes().unwrap_or(0);
-        let (mut peak, mut tables) = (held, 0);
+        let (mut peak, mut tables) =
+            (held, GridCache::departure_bytes_for(meshes.iter().map(WorldMesh::n_patches_of).sum()));
         for mesh in meshes {
             let build = WorldMesh::build_bytes(mesh);
             held = held.saturating_sub(mesh.bytes() as u64);
@@ -85,20 +101,33 @@ impl<'a> RenderScene<'a> {
             held += build.resident as u64;
             tables += build.tables;
         }
-        let needs = RenderNeeds::new(held + PREPARING_LEAVES, tables, self.settings, threads);
+        let needs = RenderNeeds::new(held + PREPARING_LEAVES, tables, 0, self.settings, threads);
         let smallest = peak.max(needs.smallest_budget());
-        if smallest > budget { Err(too_small(budget, smallest, "to prepare the meshes; then")) } else { Ok(()) }
+        if smallest > budget { Err(too_small_for("prepare the meshes", budget, smallest)) } else { Ok(()) }
     }
 
     /// Prepares meshes that have been read, and the camera that frames them.
     pub fn compile(&self, meshes: Vec<ControlMesh>, threads: usize, quiet: bool) -> Result<(World, Camera)> {
-        let camera = Camera::new(&self.camera.apply(camera_of(self.scene, &meshes))?);
+        let camera = Camera::new(&self.camera.apply(camera_of(self.scene, &meshes, self.settings.size))?);
         let n_faces = meshes.iter().map(ControlMesh::n_faces).sum();
         let progress = Progress::new("faces prepared", quiet);
         let height = self.settings.size[1];
-        let world = compile(self.scene, meshes, &camera, height, threads, &|k| progress.set(k, n_faces))?;
+        let at_start = process::resident_bytes().unwrap_or(0);
+        let planned = |share: f64| self.check_plans(share, at_start);
+        let world = compile(self.scene, meshes, &camera, height, threads, &|k| progress.set(k, n_faces), &planned)?;
         progress.finish();
         Ok((world, camera))
+    }
+
+    /// Refuses the budget once the plans of a mesh, of which that share is made, exceed it.
+    fn check_plans(&self, share: f64, at_start: u64) -> Result<()> {
+        let Some(budget) = self.memory else { return Ok(()) };
+        let resident = process::resident_bytes().unwrap_or(0);
+        if resident <= budget {
+            return Ok(());
+        }
+        let grown = resident.saturating_sub(at_start) as f64;
+        Err(too_small_for("plan how irregular faces are split", budget, at_start + (grown / share) as u64))
     }
 
     /// Reads all meshes.
@@ -126,11 +155,14 @@ impl Prepared<'_> {
     /// An empty cache of that size.
     pub fn cache(&self, size: CacheSize, threads: usize) -> Result<GridCache> {
         let most = match size {
-            // Pieces may need a third more than the middle vertex format, and segments are not filled to the last byte.
-            CacheSize::Unbounded => 2 * self.world.full_tessellation(threads).bytes as usize + (64 << 20),
+            CacheSize::Unbounded => self.world.full_tessellation(threads).most_bytes(),
             CacheSize::Bytes(_) => 0,
         };
         GridCache::new(&self.world, CacheConfig { capacity: size.capacity(most), ..CacheConfig::with_bytes(0) })
+    }
+
+    fn departure_bytes(&self) -> usize {
+        GridCache::departure_bytes_for(self.world.meshes().iter().map(|mesh| mesh.surface().n_patches()).sum())
     }
 
     /// The cache that a budget for the whole process leaves room for.
@@ -140,8 +172,8 @@ impl Prepared<'_> {
     pub fn cache_within(&self, budget: u64, threads: usize) -> Result<CacheSize> {
         process::give_back_freed_memory();
         let resident = process::resident_bytes().unwrap_or(self.world.bytes() as u64);
-        let tables = GridCache::table_bytes_for(&self.world) + GridCache::departure_bytes_for(&self.world);
-        let needs = RenderNeeds::new(resident, tables, self.settings, threads);
+        let tables = GridCache::table_bytes_for(&self.world) + self.departure_bytes();
+        let needs = RenderNeeds::new(resident, tables, self.world.largest_ring(), self.settings, threads);
         Ok(CacheSize::Bytes(needs.cache_bytes(budget)?))
     }
 

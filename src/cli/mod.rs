@@ -16,6 +16,7 @@ pub mod input;
 pub mod interrupt;
 mod job;
 mod output;
+mod outputs;
 pub mod picture;
 pub mod progress;
 pub mod render;
@@ -29,7 +30,7 @@ pub mod tune;
 pub mod values;
 
 use crate::error::{Error, Result};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 /// Help heading of flags that change what is computed.
 pub const PICTURE: &str = "What the picture shows (these change it)";
@@ -62,6 +63,22 @@ enum Command {
 }
 
 impl Cli {
+    /// What was typed; ends the program after help, and if it makes no sense.
+    pub fn typed() -> Self {
+        let matches = Self::definition().get_matches();
+        Self::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
+    }
+
+    /// The arguments. A negative number after an option is its value, so that the message is about numbers.
+    fn definition() -> clap::Command {
+        let takes_numbers =
+            |argument: clap::Arg| match argument.get_action().takes_values() && !argument.is_positional() {
+                true => argument.allow_negative_numbers(true),
+                false => argument,
+            };
+        Self::command().mut_subcommands(|command| command.mut_args(takes_numbers))
+    }
+
     /// Does what was asked for.
     pub fn run(self) -> Result<()> {
         match self.command {
@@ -96,11 +113,21 @@ pub fn describe(error: &Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn arguments_are_consistent() {
-        Cli::command().debug_assert();
+        Cli::definition().debug_assert();
+    }
+
+    #[test]
+    fn negative_numbers_are_refused_as_numbers() {
+        for (line, message) in [
+            ("lazytess render a.obj -o a.png --spp -1", "'-1' is no count"),
+            ("lazytess bench a.obj --rate -3", "'-3' is no rate"),
+        ] {
+            let refusal = Cli::definition().try_get_matches_from(line.split(' ')).unwrap_err().to_string();
+            assert!(refusal.contains(message), "{refusal}");
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use super::input::{EditArgs, load_scene, settle_rates};
 use super::interrupt::cancel_on_interrupt;
 use super::job::{Prepared, RenderScene};
+use super::outputs::check_outputs;
 use super::picture::PictureArgs;
 use super::run_options::{MemoryArgs, RunArgs};
 use super::values::{ByteSize, CacheSize};
@@ -105,9 +106,10 @@ impl RenderArgs {
         if format == PictureFormat::Png && !self.aov.iter().all(|&aov| output::is_drawn(aov)) {
             return Err(Error::input("--aov needs an EXR file: a PNG has no layers").at(&self.output, None));
         }
-        for file in [Some(&self.output), self.stats.as_ref()].into_iter().flatten() {
-            check_folder(file)?;
+        if let Some(twice) = (1..self.aov.len()).find(|&i| self.aov[..i].contains(&self.aov[i])) {
+            return Err(Error::input(format!("--aov names {} twice", self.aov[twice])));
         }
+        check_outputs(&[Some(&self.output), self.stats.as_deref()], &[&self.input])?;
         let mut scene = load_scene(&self.input)?;
         settle_rates(&mut scene, self.picture.rate);
         Ok(RenderJob {
@@ -226,16 +228,6 @@ impl RenderJob {
             memory: MemoryReport { budget_bytes: self.memory, peak_resident_bytes: None },
             seconds: prepared.seconds,
         }
-    }
-}
-
-/// Better told before an hour of rendering than after.
-fn check_folder(file: &Path) -> Result<()> {
-    match file.parent() {
-        Some(folder) if folder != Path::new("") && !folder.is_dir() => {
-            Err(Error::input(format!("there is no folder {} to write to", folder.display())).at(file, None))
-        }
-        _ => Ok(()),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Flags that only change speed and memory: shared by every command that traces rays.
 
 use super::SPEED;
-use super::values::{ByteSize, CacheSize, count};
+use super::values::{ByteSize, CacheSize, threads};
 use crate::io::process::available_bytes;
 use clap::Args;
 
@@ -13,7 +13,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "SIZE|unbounded", help_heading = SPEED)]
     pub cache: Option<CacheSize>,
     /// Worker threads [default: one for each processor]
-    #[arg(long, value_name = "N", value_parser = count, help_heading = SPEED)]
+    #[arg(long, value_name = "N", value_parser = threads, help_heading = SPEED)]
     pub threads: Option<u32>,
     /// No progress bar and no summary; errors and warnings are still told
     #[arg(long, short, help_heading = SPEED)]

@@ -3,6 +3,7 @@
 use super::input::{EditArgs, load_scene, settle_rates};
 use super::interrupt::cancel_on_interrupt;
 use super::job::{Prepared, RenderScene};
+use super::outputs::check_outputs;
 use super::picture::PictureArgs;
 use super::progress::Progress;
 use super::run_options::RunArgs;
@@ -51,7 +52,7 @@ pub struct TradeoffArgs {
     #[arg(long, value_name = "NAME", help_heading = PICTURE)]
     pub integrator: Option<IntegratorKind>,
     /// Print the thesis's tables 5.1 to 5.3 instead: rays and times at subdivision depths 0 to 3, in both readings
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["rates", "tolerances", "groups", "json", "svg"])]
     pub thesis: bool,
     /// Write the sweep as JSON
     #[arg(long, value_name = "FILE.json")]
@@ -73,6 +74,7 @@ pub struct TradeoffArgs {
 impl TradeoffArgs {
     /// Measures and prints.
     pub fn run(&self) -> Result<()> {
+        check_outputs(&[self.json.as_deref(), self.svg.as_deref()], &[&self.input])?;
         let cancel = cancel_on_interrupt()?;
         let mut scene = load_scene(&self.input)?;
         let settings = self.settings(&scene)?;

@@ -2,10 +2,11 @@
 
 use super::input::{load_scene, settle_rates};
 use super::interrupt::cancel_on_interrupt;
+use super::outputs::check_outputs;
 use super::picture::PictureArgs;
 use super::run_options::RunArgs;
 use super::stdout;
-use super::values::CacheSize;
+use super::values::{CacheSize, decimal_count};
 use crate::cache::TraceLog;
 use crate::error::{Error, ErrorKind, Result};
 use crate::io::process::Stopwatch;
@@ -15,6 +16,9 @@ use crate::report::{RecordedRender, Tuning};
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
+
+/// Accesses that a replay needs to tell anything.
+const LEAST_ACCESSES: u64 = 1000;
 
 /// Find out how large the cache should be
 ///
@@ -32,8 +36,8 @@ pub struct TuneArgs {
     #[arg(long, value_name = "FILE.svg")]
     pub svg: Option<PathBuf>,
     /// Accesses to keep, 8 bytes each; a render with more is sampled
-    #[arg(long, value_name = "N", default_value_t = 4_000_000)]
-    pub accesses: usize,
+    #[arg(long, value_name = "N", default_value = "4M", value_parser = decimal_count)]
+    pub accesses: u64,
     /// The picture
     #[command(flatten)]
     pub picture: PictureArgs,
@@ -45,6 +49,7 @@ pub struct TuneArgs {
 impl TuneArgs {
     /// Renders, replays and tells.
     pub fn run(self) -> Result<()> {
+        check_outputs(&[self.svg.as_deref()], &[&self.input])?;
         let tuning = self.tuning()?;
         if let Some(path) = &self.svg {
             let svg = tuning_svg(&tuning).map_err(|e| Error::input(format!("the plot cannot be drawn: {e}")))?;
@@ -69,7 +74,7 @@ impl TuneArgs {
         let prepared = render.prepare(threads, quiet)?;
         let size = self.run.cache();
         let mut cache = prepared.cache(size, threads)?;
-        cache.record(TraceLog::new(self.accesses));
+        cache.record(TraceLog::new(self.accesses.max(LEAST_ACCESSES) as usize));
         let watch = Stopwatch::start();
         let rendered = prepared.render(&cache, threads, quiet, &cancel)?;
         let seconds = watch.seconds().0;

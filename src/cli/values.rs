@@ -15,12 +15,12 @@ impl FromStr for ByteSize {
         let wrong = || format!("'{text}' is no size: write bytes, or a number with K, M, G or T such as 64M");
         let split = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
         let (number, unit) = text.split_at(split);
-        let shift = match unit.to_ascii_uppercase().trim_end_matches('B').trim_end_matches('I') {
-            "" if unit.is_empty() || unit.eq_ignore_ascii_case("B") => 0,
-            "K" => 10,
-            "M" => 20,
-            "G" => 30,
-            "T" => 40,
+        let shift = match unit.to_ascii_uppercase().as_str() {
+            "" | "B" => 0,
+            "K" | "KB" | "KIB" => 10,
+            "M" | "MB" | "MIB" => 20,
+            "G" | "GB" | "GIB" => 30,
+            "T" | "TB" | "TIB" => 40,
             _ => return Err(wrong()),
         };
         let bytes = number.parse::<f64>().map_err(|_| wrong())? * (1u64 << shift) as f64;
@@ -91,9 +91,41 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("'{text}' is no number from 0 up"))
 }
 
+/// A number of threads.
+pub fn threads(text: &str) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|n| (1..=1024).contains(n));
+    number.ok_or_else(|| format!("'{text}' is no number of threads: write a whole number from 1 to 1024"))
+}
+
 /// A count, 1 or more.
 pub fn count(text: &str) -> Result<u32, String> {
-    text.parse().ok().filter(|&n| n > 0).ok_or_else(|| format!("'{text}' is no count: write a whole number from 1 up"))
+    let number = text.parse().ok().filter(|&n| n > 0);
+    number.ok_or_else(|| format!("'{text}' is no count: write a whole number from 1 to {}", u32::MAX))
+}
+
+/// Segments of an edge.
+pub fn fixed_rate(text: &str) -> Result<u32, String> {
+    let number = text.strip_prefix("fixed:").unwrap_or(text).parse().ok().filter(|n| (1..=4096).contains(n));
+    number.ok_or_else(|| format!("'{text}' is no rate: write a whole number of segments from 1 to 4096"))
+}
+
+/// How many of something there may be very many of, typed like `100000`, `20k`, `10M`; K is 1000 here.
+pub fn decimal_count(text: &str) -> Result<u64, String> {
+    let wrong = || format!("'{text}' is no count: write a whole number from 1 up, or one with k, M or G such as 20k");
+    let (number, thousands) = match text.strip_suffix(|unit: char| unit.is_ascii_alphabetic()) {
+        None => (text, 0),
+        Some(number) => (
+            number,
+            match &text[number.len()..] {
+                "k" | "K" => 1,
+                "m" | "M" => 2,
+                "g" | "G" => 3,
+                _ => return Err(wrong()),
+            },
+        ),
+    };
+    let count = number.parse::<u64>().ok().and_then(|n| n.checked_mul(1000u64.pow(thousands)));
+    count.filter(|&n| n > 0).ok_or_else(wrong)
 }
 
 /// A number from 0 up, or a fraction of two.
@@ -117,6 +149,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn counts_are_decimal() {
+        assert_eq!([decimal_count("7"), decimal_count("20k"), decimal_count("3M")], [Ok(7), Ok(20_000), Ok(3_000_000)]);
+        for bad in ["", "0", "k", "-1", "1.5M", "1e6", "99999999999G", "7MB"] {
+            assert!(decimal_count(bad).unwrap_err().contains("is no count"), "{bad}");
+        }
+    }
+
+    #[test]
     fn sizes_are_binary() {
         let bytes = |text: &str| text.parse::<ByteSize>().map(|size| size.0);
         assert_eq!(bytes("0"), Ok(0));
@@ -126,7 +166,8 @@ mod tests {
         assert_eq!(bytes("2GiB"), Ok(2 << 30));
         assert_eq!(bytes("7kb"), Ok(7 << 10));
         assert_eq!(bytes("12B"), Ok(12));
-        for bad in ["", "M", "-1", "1X", "1.2.3M", "1e6", "64 M", "nan", "9999999T", "iB", "1i"] {
+        for bad in ["", "M", "-1", "1X", "1.2.3M", "1e6", "64 M", "nan", "9999999T", "iB", "1i", "7KI", "7kIIB", "7kbb"]
+        {
             assert!(bytes(bad).unwrap_err().contains("is no size"), "{bad}");
         }
         assert_eq!("unbounded".parse(), Ok(CacheSize::Unbounded));

@@ -59,9 +59,9 @@ impl DifferenceMap {
         *values.select_nth_unstable_by(rank.saturating_sub(1), f32::total_cmp).1
     }
 
-    /// Share of pixels (0 to 1) whose difference is above `limit`.
+    /// Share of pixels (0 to 1) whose difference is above `limit`, by more than the way to linear values and back rounds it.
     pub fn share_above(&self, limit: f32) -> f64 {
-        self.values.iter().filter(|&&d| d > limit).count() as f64 / self.values.len() as f64
+        self.values.iter().filter(|&&d| is_above(d, limit)).count() as f64 / self.values.len() as f64
     }
 
     /// The tile of a [`TILE_SIDE`] grid with the largest mean, the first of equals. Border tiles may be smaller.
@@ -99,6 +99,15 @@ pub fn psnr(a: &[[f32; 3]], b: &[[f32; 3]]) -> Option<f64> {
 /// Largest difference of two colours over their channels.
 pub(super) fn largest_difference(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).fold(0.0, |max, i| max.max((a[i] - b[i]).abs()))
+}
+
+/// A difference of two display values in single precision, each of which went to linear light and back, errs by less than this: pictures
+/// of 8 or 16 bits have differences of whole steps.
+const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
+
+/// Whether a difference is above a limit, roundings aside.
+pub fn is_above(difference: f32, limit: f32) -> bool {
+    difference > limit + ROUNDING
 }
 
 #[cfg(test)]

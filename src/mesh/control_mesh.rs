@@ -100,6 +100,10 @@ pub struct ControlMesh {
 }
 
 impl ControlMesh {
+    /// Corners that a face can have: what is known of a polygon takes 4 bytes for each pair of its corners, and several times as
+    /// much while it is found out.
+    pub const MOST_CORNERS: u32 = 4096;
+
     /// A mesh of polygons without tags.
     pub fn from_polygons(positions: Vec<DVec3>, faces: &[Vec<u32>]) -> Result<Self> {
         let mesh = ControlMesh {
@@ -127,6 +131,10 @@ impl ControlMesh {
         if let Some(f) = self.face_sizes.iter().position(|&n| n < 3) {
             let n = self.face_sizes[f];
             return Err(Error::input(format!("face {f} (from 0) has {n} corners; a face needs at least 3")));
+        }
+        if let Some(f) = self.face_sizes.iter().position(|&n| n > Self::MOST_CORNERS) {
+            let (n, most) = (self.face_sizes[f], Self::MOST_CORNERS);
+            return Err(Error::input(format!("face {f} (from 0) has {n} corners, more than {most}: divide it")));
         }
         if self.face_sizes.iter().map(|&n| n as usize).sum::<usize>() != self.face_vertices.len() {
             return Err(Error::input("the face sizes do not add up to the number of face corners"));

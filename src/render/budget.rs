@@ -23,6 +23,13 @@ use std::fmt;
 /// a tile of pixels, and what the allocator keeps for it.
 pub const WORKER_BYTES: usize = SegmentCache::SCRATCH_BYTES + (768 << 10);
 
+/// Bytes that a worker may touch for each point of the largest ring of a face, beyond those of [`ORDINARY_RING`]: of 16 patches, for
+/// building and for shading, the points of some 30 levels are remembered. (Measured with polygons of 1000 and 4000 sides: 23 KiB.)
+const BYTES_PER_RING_POINT: usize = 24 << 10;
+
+/// Points of a ring that a worker has room for anyway.
+const ORDINARY_RING: usize = 64;
+
 /// Bytes for everything too small to be counted: progress bar, statistics, code that was not run yet.
 const ODDS_AND_ENDS: u64 = 2 << 20;
 
@@ -44,11 +51,12 @@ pub struct RenderNeeds {
 }
 
 impl RenderNeeds {
-    /// The needs of a render on `threads` threads, of a world that needs `tables` bytes of slots, when `resident` bytes
-    /// are resident.
-    pub fn new(resident: u64, tables: usize, settings: &RenderSettings, threads: usize) -> Self {
+    /// The needs of a render on `threads` threads, of a world that needs `tables` bytes of slots and whose largest ring has so
+    /// many points, when `resident` bytes are resident.
+    pub fn new(resident: u64, tables: usize, largest_ring: usize, settings: &RenderSettings, threads: usize) -> Self {
         let film = Film::n_bytes(settings.window, &settings.aovs) as u64;
-        let workers = (WORKER_BYTES * threads) as u64;
+        let of_rings = BYTES_PER_RING_POINT * largest_ring.saturating_sub(ORDINARY_RING);
+        let workers = ((WORKER_BYTES + of_rings) * threads) as u64;
         let groups = group_bytes(settings, threads) as u64;
         // Channel by channel the film is copied once; encoders hold a copy of some lines in another form.
         Self { resident, tables: tables as u64, film, workers, groups, writing: 2 * film }
@@ -99,10 +107,20 @@ fn canvas_bytes(settings: &RenderSettings) -> usize {
 
 /// The error of a budget below `smallest`, which is needed for `what`. Names a little more, because what is resident
 /// differs from run to run.
-pub fn too_small(budget: u64, smallest: u64, what: impl fmt::Display) -> Error {
-    let (given, smallest) = (mebibytes(budget), mebibytes(smallest + smallest / 32 + (1 << 20)));
+fn too_small(budget: u64, smallest: u64, what: impl fmt::Display) -> Error {
+    let (given, smallest) = (mebibytes(budget), mebibytes(with_margin(smallest)));
     let message = format!("--memory {given}M is too little; {smallest}M would do ({what}, cache as much as is left)");
     Error::new(ErrorKind::Budget, message)
+}
+
+/// The refusal of a budget before all is known that will be needed: `least` bytes for `what`.
+pub fn too_small_for(what: &str, budget: u64, least: u64) -> Error {
+    let (given, least) = (mebibytes(budget), mebibytes(with_margin(least)));
+    Error::new(ErrorKind::Budget, format!("--memory {given}M is too little; {least}M at least are needed to {what}"))
+}
+
+fn with_margin(bytes: u64) -> u64 {
+    bytes + bytes / 32 + (1 << 20)
 }
 
 /// Rounded up.
@@ -116,7 +134,7 @@ mod tests {
 
     #[test]
     fn the_smallest_budget_named_is_accepted_and_one_less_refused() {
-        let needs = RenderNeeds::new(50 << 20, 1 << 20, &RenderSettings::of_size([100, 100]), 2);
+        let needs = RenderNeeds::new(50 << 20, 1 << 20, 30, &RenderSettings::of_size([100, 100]), 2);
         let refusal = needs.cache_bytes(10 << 20).unwrap_err();
         assert!(refusal.to_string().contains("M would do (program and meshes 50M, slots 1M"), "{refusal}");
         let smallest = needs.smallest_budget();

@@ -4,6 +4,7 @@ use super::groups::NO_GROUP;
 use super::reason::Reason;
 use super::tiles::PixelRect;
 use super::tracer::Built;
+use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
@@ -65,6 +66,13 @@ impl Aov {
             Self::Reason => ("", &["reason"]),
             Self::Error => ("", &["error"]),
         }
+    }
+}
+
+impl fmt::Display for Aov {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, _) = Self::ALL.iter().find(|(_, aov)| aov == self).expect("ALL has all");
+        f.write_str(name)
     }
 }
 

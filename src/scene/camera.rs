@@ -110,6 +110,12 @@ impl CameraDescription {
         let eye = at + (DEFAULT_DISTANCE * diagonal) * DVec3::new(1.0, 0.6, 1.2).normalize();
         Self { eye, at, up: DVec3::Y, fov: DEFAULT_FOV }
     }
+
+    /// The same for pictures of that size: if they are narrower than 4 to 3, from so far away that they are as wide as such a one.
+    pub fn for_pictures_of(self, [width, height]: [u32; 2]) -> Self {
+        let narrower = 4.0 * f64::from(height) / (3.0 * f64::from(width));
+        if narrower > 1.0 { Self { eye: self.at + narrower * (self.eye - self.at), ..self } } else { self }
+    }
 }
 
 #[cfg(test)]
@@ -127,6 +133,18 @@ mod tests {
         let expected = 1.35 * 12.0_f64.sqrt() / 2.8_f64.sqrt() * DVec3::new(1.0, 0.6, 1.2);
         assert!((camera.eye() - expected).length() < 1e-14);
         assert!((camera.forward() + expected.normalize()).length() < 1e-15);
+    }
+
+    #[test]
+    fn narrow_pictures_are_as_wide_as_others() {
+        let framing = CameraDescription::framing([DVec3::splat(-1.0), DVec3::splat(1.0)].into_iter().collect());
+        assert_eq!(framing.for_pictures_of([800, 600]), framing);
+        assert_eq!(framing.for_pictures_of([1920, 1080]), framing);
+        let reach = |size: [u32; 2]| {
+            let camera = Camera::new(&framing.for_pictures_of(size));
+            camera.raster_from_view(camera.view_from_world(camera.right), size).x / f64::from(size[0])
+        };
+        assert!((reach([300, 600]) - reach([800, 600])).abs() < 1e-12);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::description::MeshDescription;
 use super::entrance::Entrance;
 use super::rate::DicingRate;
 use crate::cache::{CacheConfig, SegmentCache, SlotTable, TraceLog};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::grid::MAX_CELLS;
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Bounds, DBounds};
@@ -78,6 +78,15 @@ pub struct WorldMesh {
     lattice_per_world: f32,
 }
 
+/// Who watches while a mesh is prepared.
+pub struct Watch<'a> {
+    /// Is told which share of the work is done, now and then, from any thread.
+    pub progress: &'a (dyn Fn(f64) + Sync),
+    /// Is told which share of the plans is made, now and then, and ends the work by an error: how much memory plans take cannot
+    /// be told before.
+    pub planned: &'a dyn Fn(f64) -> Result<()>,
+}
+
 /// What the full tessellation would take.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct FullTessellation {
@@ -87,8 +96,16 @@ pub struct FullTessellation {
     pub triangles: u64,
     /// Pieces of at most 8 x 8 cells.
     pub pieces: u64,
-    /// Bytes of pieces and nodes, at the middle vertex format.
+    /// Bytes of pieces and nodes, estimated: at the middle vertex format, where most pieces take the small one.
     pub bytes: u64,
+}
+
+impl FullTessellation {
+    /// More bytes than all of it can take: pieces may need a third more than the middle vertex format, and segments are not
+    /// filled to the last byte.
+    pub fn most_bytes(&self) -> usize {
+        2 * self.bytes as usize + (64 << 20)
+    }
 }
 
 impl World {
@@ -130,6 +147,11 @@ impl World {
         self.meshes.iter().map(WorldMesh::n_leaves).sum()
     }
 
+    /// Points of the largest ring around a face.
+    pub fn largest_ring(&self) -> usize {
+        self.meshes.iter().map(|mesh| mesh.surface.plans().largest_ring()).max().unwrap_or(0)
+    }
+
     /// Triangles and bytes if every patch were tessellated.
     pub fn full_tessellation(&self, n_threads: usize) -> FullTessellation {
         self.meshes.iter().map(|m| m.full_tessellation(n_threads)).fold(FullTessellation::default(), |a, b| {
@@ -164,28 +186,30 @@ fn scene_box(scene_from_world: DAffine3, b: DBounds) -> Bounds {
     Bounds { min: (min - 1.0).floor().as_vec3(), max: (max + 1.0).ceil().as_vec3() }
 }
 
-/// Whether the map is one scale for all directions and a turn, mirrored or not, but for a hundredth.
+/// Whether the map is one scale for all directions and a turn, mirrored or not, but for so little that what is normal to a
+/// triangle in one space is so in the other within the margins of horizons and skylines.
 fn keeps_angles(map: &DMat3) -> bool {
     let gram = map.transpose() * *map;
     let scale = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;
-    (gram - DMat3::from_diagonal(DVec3::splat(scale))).abs_diff_eq(DMat3::ZERO, 0.01 * scale)
+    (gram - DMat3::from_diagonal(DVec3::splat(scale))).abs_diff_eq(DMat3::ZERO, 1e-5 * scale)
 }
 
 impl WorldMesh {
     /// Prepares a mesh for tracing on `n_threads` threads: plans, boxes and tree, but no grid.
     pub fn new(mesh: ControlMesh, world_from_object: DAffine3, rate: DicingRate, n_threads: usize) -> Result<Self> {
-        Self::prepare(mesh, world_from_object, rate, n_threads, &|_| ())
+        Self::prepare(mesh, world_from_object, rate, n_threads, &Watch { progress: &|_| (), planned: &|_| Ok(()) })
     }
 
-    /// As [`new`](Self::new); `progress` is told which share of the work is done, now and then, from any thread.
+    /// As [`new`](Self::new), watched.
     pub fn prepare(
         mesh: ControlMesh,
         world_from_object: DAffine3,
         rate: DicingRate,
         n_threads: usize,
-        progress: &(dyn Fn(f64) + Sync),
+        watch: &Watch<'_>,
     ) -> Result<Self> {
-        let surface = Surface::new(&mesh, n_threads)?;
+        let Watch { progress, planned } = watch;
+        let surface = Surface::prepare(&mesh, n_threads, planned)?;
         progress(SHARE_OF_SURFACE);
         // The tree over ten million patches takes a gigabyte to build: polygons and positions are gone before.
         drop(mesh);
@@ -227,10 +251,10 @@ impl WorldMesh {
         mesh: ControlMesh,
         rate: DicingRate,
         n_threads: usize,
-        progress: &(dyn Fn(f64) + Sync),
+        watch: &Watch<'_>,
     ) -> Result<Self> {
-        Self::prepare(mesh, description.world_from_object, rate, n_threads, progress)
-            .map_err(|e| Error::input(format!("{}: {e}", description.file.display())))
+        Self::prepare(mesh, description.world_from_object, rate, n_threads, watch)
+            .map_err(|e| e.at(&description.file, None))
     }
 
     /// Whether the way from the world to the lattice turns right angles into right angles, but for a degree.
@@ -312,10 +336,15 @@ impl WorldMesh {
         &self.entrance
     }
 
-    /// What [`new`](Self::new) will take for this mesh.
+    /// Patches of a mesh, hidden ones included.
+    pub fn n_patches_of(mesh: &ControlMesh) -> usize {
+        mesh.face_sizes.iter().map(|&n| if n == 4 { 1 } else { n as usize }).sum()
+    }
+
+    /// What [`new`](Self::new) will take for this mesh, but for its plans.
     pub fn build_bytes(mesh: &ControlMesh) -> BuildBytes {
         let (corners, vertices) = (mesh.face_vertices.len(), mesh.positions.len());
-        let patches: usize = mesh.face_sizes.iter().map(|&n| if n == 4 { 1 } else { n as usize }).sum();
+        let patches = Self::n_patches_of(mesh);
         let mixed = if patches == mesh.n_faces() { 0 } else { 8 * mesh.n_faces() + (corners + patches) / 4 };
         let surface = 8 * corners + 12 * vertices + vertices / 8 + 4 * mesh.n_faces() + mixed;
         let tree = TREE_BYTES_PER_PATCH * patches;
@@ -497,9 +526,10 @@ impl GridCache {
         world.meshes.iter().map(|m| m.top.n_slots()).map(|n| 8 * n + 8 * n.div_ceil(64)).sum()
     }
 
-    /// Bytes of what all threads remember of patches that rays leave, whatever the number of faces: some 3 MiB at most.
-    pub fn departure_bytes_for(world: &World) -> usize {
-        Departures::bytes_for(world.meshes.iter().map(|m| m.surface.n_patches()).sum())
+    /// Bytes of what all threads remember of patches that rays leave, for so many patches in all, hidden ones included: some
+    /// 3 MiB at most.
+    pub fn departure_bytes_for(n_patches: usize) -> usize {
+        Departures::bytes_for(n_patches)
     }
 
     /// Bytes of slots and marks, the arena not included.

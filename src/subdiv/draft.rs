@@ -7,6 +7,7 @@ use super::pole::Pole;
 use super::rows::sort_by_weight;
 use super::rules::{self, CornerLimit, Origin, RefinedView, Row, RuleSet};
 use crate::topology::NONE;
+use std::sync::Arc;
 
 /// A ring's node, on its own.
 pub(super) enum Draft {
@@ -30,8 +31,8 @@ pub(super) struct SplitDraft {
 
 /// A quarter that will be a child.
 pub(super) struct Quarter {
-    /// The key of its ring, made less sharp.
-    pub key: Vec<u32>,
+    /// The key of its ring, made less sharp; shared with the quarter before if they are equal, as those of a polygon are.
+    pub key: Arc<[u32]>,
     /// The half-edge of the refined ring where its own starts.
     pub start: u32,
     /// How many steps sharper it is than the ring with the key.
@@ -52,7 +53,11 @@ impl Draft {
         }
         let refined = RefinedView::new(rules, ring);
         let (mut rows, pole) = RefinedRows::new(rules, ring, &refined, is_dry);
-        let quarters = (0..n).map(|k| quarter(rules, &refined, child_start(n, k), &mut rows, walker)).collect();
+        let mut quarters: Vec<Quarter> = Vec::with_capacity(n as usize);
+        for k in 0..n {
+            let quarter = quarter(rules, &refined, child_start(n, k), quarters.last(), &mut rows, walker);
+            quarters.push(quarter);
+        }
         let n_limits = if n == 4 && !is_dry { 4 } else { 0 };
         let limits = (0..n_limits).map(|k| rules::corner_limit(ring, k)).collect();
         Draft::Split(SplitDraft { rows: rows.rows, pole, quarters, limits })
@@ -64,6 +69,7 @@ fn quarter(
     rules: RuleSet,
     refined: &RefinedView<'_>,
     start: u32,
+    before: Option<&Quarter>,
     rows: &mut RefinedRows<'_>,
     walker: &mut RingWalker,
 ) -> Quarter {
@@ -72,6 +78,11 @@ fn quarter(
     let mut key = Vec::new();
     let (steps, sources) = walker.key(refined, start, look, rules.keeps_outer_tags(), rules.lowers(), &mut key);
     let points = sources.iter().map(|&v| rows.place_of(refined, v)).collect();
+    let key = before
+        .map(|quarter| &quarter.key)
+        .filter(|before| before[..] == key[..])
+        .cloned()
+        .unwrap_or_else(|| key.into());
     Quarter { key, start, steps, turn: look.turn, points }
 }
 

@@ -10,6 +10,7 @@ use super::numbering::Numbering;
 use super::plan::{NodeId, PlanLibrary};
 use super::rules::RuleSet;
 use super::surface::{EDITED, REGULAR};
+use crate::error::{Error, Result};
 use crate::ids::FaceId;
 use crate::parallel::{for_each, on_threads};
 use crate::topology::{HalfEdges, Topology};
@@ -22,6 +23,9 @@ const FACES_PER_TASK: usize = 512;
 
 /// Kinds that are drafted before their nodes are made: drafts take more memory than nodes.
 const KINDS_PER_BATCH: usize = 1024;
+
+/// The same, by the squares of how many corners their faces have.
+const CORNERS_PER_BATCH: usize = 1 << 20;
 
 /// Kinds for which another thread is worth its start.
 const LEAST_KINDS: usize = 16;
@@ -60,7 +64,8 @@ pub(super) fn plan_faces(
     rules: RuleSet,
     n_threads: usize,
     sites: &EditSites,
-) -> (PlanLibrary, Vec<NodeId>) {
+    planned: &dyn Fn(f64) -> Result<()>,
+) -> Result<(PlanLibrary, Vec<NodeId>)> {
     let mut library = PlanLibrary::new(rules);
     let mut plans = vec![REGULAR; topology.n_faces()];
     let chunks = plans.chunks_mut(FACES_PER_TASK).enumerate();
@@ -68,7 +73,7 @@ pub(super) fn plan_faces(
         chunks.map(|(i, plans)| Mutex::new(Task { first: i * FACES_PER_TASK, plans, thread: 0 })).collect();
     let sorter = Sorter { topology, rules, sites, fans: Fans::new(topology) };
     let of_threads = sort_faces(&sorter, n_threads, &tasks);
-    let nodes = plan_kinds(topology, &mut library, of_threads, n_threads);
+    let nodes = plan_kinds(topology, &mut library, of_threads, n_threads, planned)?;
     for_each(&tasks, n_threads, |_, task| {
         let Task { plans, thread, .. } = &mut *task.lock();
         for plan in plans.iter_mut().filter(|plan| ![REGULAR, EDITED].contains(plan)) {
@@ -76,7 +81,7 @@ pub(super) fn plan_faces(
         }
     });
     drop(tasks);
-    (library, plans)
+    Ok((library, plans))
 }
 
 /// What faces are sorted by.
@@ -116,13 +121,32 @@ fn plan_kinds(
     library: &mut PlanLibrary,
     of_threads: Vec<Kinds>,
     n_threads: usize,
-) -> Vec<Vec<NodeId>> {
+    planned: &dyn Fn(f64) -> Result<()>,
+) -> Result<Vec<Vec<NodeId>>> {
     let (kinds, examples) = joined(&of_threads);
     // Keys of irregular meshes are many, and the library has its own.
     drop(of_threads);
-    let nodes: Vec<NodeId> =
-        examples.chunks(KINDS_PER_BATCH).flat_map(|starts| plan_batch(topology, library, starts, n_threads)).collect();
-    kinds.iter().map(|kinds| kinds.iter().map(|&kind| nodes[kind]).collect()).collect()
+    let mut nodes: Vec<NodeId> = Vec::with_capacity(examples.len());
+    while nodes.len() < examples.len() {
+        let rest = &examples[nodes.len()..];
+        nodes.extend(plan_batch(topology, library, &rest[..batch_len(topology, rest)], n_threads));
+        if library.is_nearly_full() {
+            return Err(Error::input("the mesh has more neighbourhoods that differ than can be numbered: split it"));
+        }
+        planned(nodes.len() as f64 / examples.len() as f64)?;
+    }
+    Ok(kinds.iter().map(|kinds| kinds.iter().map(|&kind| nodes[kind]).collect()).collect())
+}
+
+/// Of rings that start there, how many are drafted at once: at least one.
+fn batch_len(topology: &Topology, starts: &[u32]) -> usize {
+    // A draft has as many quarters as its face has corners, and each the points of all of them.
+    let size = |&start: &u32| topology.corners_at(start).1.pow(2) as usize;
+    let sums = starts.iter().map(size).scan(0, |sum, size| {
+        *sum += size;
+        Some(*sum)
+    });
+    sums.take(KINDS_PER_BATCH).take_while(|&sum| sum <= CORNERS_PER_BATCH).count().max(1)
 }
 
 /// Numbers for the kinds of all threads, and where the ring of the first face of each starts.
@@ -154,7 +178,8 @@ fn plan_batch(topology: &Topology, library: &mut PlanLibrary, starts: &[u32], n_
             let mut walkers = Default::default();
             while drafts.make_next(&mut walkers) {}
         };
-        let helpers: Vec<_> = (0..n_helpers).map(|_| scope.spawn(help)).collect();
+        let spawn = |_| std::thread::Builder::new().spawn_scoped(scope, help).ok();
+        let helpers: Vec<_> = (0..n_helpers).map_while(spawn).collect();
         let mut walkers = Default::default();
         let made = drafts.made.iter().map(|draft| {
             loop {
@@ -257,7 +282,7 @@ mod tests {
             let topology = Topology::new(&mesh, 1);
             let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
             let sites = EditSites::new(&[], &topology);
-            let (_, plans) = plan_faces(&topology, rules, 3, &sites);
+            let (_, plans) = plan_faces(&topology, rules, 3, &sites, &|_| Ok(())).unwrap();
             let fans = Fans::new(&topology);
             let (mut library, mut walker) = (PlanLibrary::new(rules), RingWalker::default());
             let (mut of_node, mut of_plan) = (FxHashMap::default(), FxHashMap::default());

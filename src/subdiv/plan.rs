@@ -308,6 +308,17 @@ impl PlanLibrary {
         keys + self.rows.bytes() + nodes
     }
 
+    /// Points of the largest ring.
+    pub fn largest_ring(&self) -> usize {
+        self.nodes.iter().map(|node| node.n_points as usize).max().unwrap_or(0)
+    }
+
+    /// Whether numbers of nodes, or of their rows, might not do for many more.
+    pub(super) fn is_nearly_full(&self) -> bool {
+        const MANY: usize = 1 << 20;
+        self.nodes.len() + MANY > 1 << (u32::BITS - INDEX_SHIFT) || self.rows.is_nearly_full()
+    }
+
     /// Forgets how nodes were found, once no more are needed.
     pub fn seal(&mut self) {
         self.by_key = FxHashMap::default();
@@ -460,7 +471,7 @@ impl PlanLibrary {
         let mut refined = None;
         let child = |quarter: &Quarter| {
             let (mut cut_out, key) = (None, &quarter.key);
-            let node = self.by_key.get(key).copied().unwrap_or_else(|| {
+            let node = self.by_key.get(&key[..]).copied().unwrap_or_else(|| {
                 let refined = refined.get_or_insert_with(|| RefinedView::new(self.rules, ring));
                 let ring = cut_out.insert(self.cut_out(refined, quarter));
                 self.make_node(ring, key, None).0

@@ -355,6 +355,12 @@ impl RowStore {
         }
     }
 
+    /// Whether numbers of 32 bits might not do for many more.
+    pub(super) fn is_nearly_full(&self) -> bool {
+        const MANY: usize = 1 << 28;
+        self.indices.len().max(self.weights.len()).max(self.rows.len()) + MANY > u32::MAX as usize
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let known_masks: usize = self.known_masks.keys().map(|k| 8 * k.len() + 40).sum();

@@ -11,7 +11,7 @@ use super::regular::ControlPoints;
 use super::route::RouteWalker;
 use super::rows::Width;
 use super::rules::RuleSet;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::ids::{FaceId, PatchId};
 use crate::math::{DBounds, PointGrid};
 use crate::mesh::ControlMesh;
@@ -134,16 +134,18 @@ static SURFACES: AtomicU64 = AtomicU64::new(0);
 impl Surface {
     /// Prepares a mesh, on `n_threads` threads.
     pub fn new(mesh: &ControlMesh, n_threads: usize) -> Result<Self> {
+        Self::prepare(mesh, n_threads, &|_| Ok(()))
+    }
+
+    /// As [`new`](Self::new); `planned` is told now and then which share of the plans is made, and ends it by an error: nobody
+    /// can tell before how much memory they take.
+    pub fn prepare(mesh: &ControlMesh, n_threads: usize, planned: &dyn Fn(f64) -> Result<()>) -> Result<Self> {
         let n_threads = n_threads.max(1);
         let topology = Topology::new(mesh, n_threads);
         let rules = RuleSet { crease_method: mesh.crease_method, triangles: mesh.triangles };
         let sites = EditSites::new(&mesh.edits, &topology);
-        let (plans, plan_of_face) = plan_faces(&topology, rules, n_threads, &sites);
+        let (plans, plan_of_face) = plan_faces(&topology, rules, n_threads, &sites, planned)?;
         let n_patches = |n: u32| if n == 4 { 1 } else { n };
-        let total: u64 = mesh.face_sizes.iter().map(|&n| u64::from(n_patches(n))).sum();
-        if total > u64::from(u32::MAX / 2) {
-            return Err(Error::input("the mesh has more than 2^31 patches: split it"));
-        }
         let patches = || FaceIndex::mixed(mesh.face_sizes.iter().map(|&n| n_patches(n)));
         let faces_of_patches = (!topology.all_quads()).then(patches);
         let lattice = Lattice { center: DVec3::ZERO, step: 1.0 };

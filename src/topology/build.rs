@@ -245,8 +245,11 @@ impl Topology {
         for end in [h, twin] {
             set_bit(&mut self.tagged, self.vertex[end as usize].0);
         }
-        self.edge_sharpness.insert(h.min(twin), sharpness);
-        self.edge_sharpness.retain(|_, s| *s > 0.0);
+        if sharpness > 0.0 {
+            self.edge_sharpness.insert(h.min(twin), sharpness);
+        } else {
+            self.edge_sharpness.remove(&h.min(twin));
+        }
     }
 
     /// Infinitely sharp, unless the vertex is an inner vertex of a fin: exactly two non-manifold edges, no boundary

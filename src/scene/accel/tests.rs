@@ -72,7 +72,7 @@ fn entry(b: &Bounds, origin: DVec3, direction: DVec3) -> Option<f64> {
 
 /// Numbers of patches whose trees are built either way.
 const THOROUGH: usize = 16_000;
-const HASTY: usize = 20_000;
+const HASTY: usize = 70_000;
 
 #[test]
 fn a_tree_over_nothing_visits_nothing() {
