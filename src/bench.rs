@@ -15,11 +15,11 @@
 //! the threads (`cpu`).
 
 use crate::io::process::thread_cpu;
-use crate::math::{Hit, Intersect, PrimitiveRef, Ray};
+use crate::math::{DBounds, Hit, Intersect, PrimitiveRef, Ray, RayBounds};
 use crate::parallel::on_threads;
 use crate::render::sampler::hash2;
 use crate::scene::camera::Camera;
-use glam::{DVec2, Vec3};
+use glam::{DVec2, Vec3, Vec3A};
 use parking_lot::Mutex;
 use serde::Serialize;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -35,6 +35,18 @@ const CHUNK: usize = 1024;
 struct BenchRay {
     origin: Vec3,
     direction: Vec3,
+}
+
+/// The bundle of some rays, in the precision that they have.
+fn bounds_of(rays: &[BenchRay]) -> RayBounds {
+    let (mut low, mut high) = ([Vec3A::INFINITY; 2], [Vec3A::NEG_INFINITY; 2]);
+    for ray in rays {
+        for (k, v) in [ray.origin, ray.direction].into_iter().enumerate() {
+            (low[k], high[k]) = (low[k].min(v.into()), high[k].max(v.into()));
+        }
+    }
+    let [origin, direction] = [0, 1].map(|k| DBounds { min: low[k].as_dvec3(), max: high[k].as_dvec3() });
+    RayBounds { origin, direction }
 }
 
 impl BenchRay {
@@ -243,7 +255,7 @@ impl Bench {
         let mut pass = |threads| {
             parallel(threads, make_tracer, &mut tiles, |tracer, tile, hits| {
                 let rays = &primary[starts[tile]..starts[tile + 1]];
-                tracer.aim(&rays.iter().map(BenchRay::ray).collect());
+                tracer.aim(&bounds_of(rays));
                 for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
                     *hit = tracer.closest(&ray.ray()).map_or(BenchHit::MISS, |h| bench_hit(&h));
                 }
