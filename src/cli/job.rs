@@ -161,7 +161,8 @@ impl Prepared<'_> {
         GridCache::new(&self.world, CacheConfig { capacity: size.capacity(most), ..CacheConfig::with_bytes(0) })
     }
 
-    fn departure_bytes(&self) -> usize {
+    /// Bytes of what is remembered of patches that rays leave.
+    pub fn departure_bytes(&self) -> usize {
         GridCache::departure_bytes_for(self.world.meshes().iter().map(|mesh| mesh.surface().n_patches()).sum())
     }
 

@@ -14,7 +14,8 @@ use crate::io::write::write_whole;
 use crate::render::workers::Rendered;
 use crate::render::{Aov, RenderSettings};
 use crate::report::{
-    CacheReport, CostReport, GeometryReport, GroupReport, MemoryReport, PictureReport, RayReport, RenderStatistics,
+    CacheReport, CostReport, DepartureReport, GeometryReport, GroupReport, MemoryReport, PictureReport, RayReport,
+    RenderStatistics,
 };
 use crate::scene::description::SceneDescription;
 use crate::scene::world::GridCache;
@@ -225,6 +226,7 @@ impl RenderJob {
             },
             cache: CacheReport::new(capacity, &cache.segments().statistics()),
             costs: CostReport::new(&prepared.world, &cache.costs()),
+            departures: DepartureReport { counts: cache.departure_counts(), bytes: prepared.departure_bytes() as u64 },
             memory: MemoryReport { budget_bytes: self.memory, peak_resident_bytes: None },
             seconds: prepared.seconds,
         }

@@ -15,8 +15,8 @@ pub mod tuning;
 
 pub use inventory::{CacheAdvice, Inventory};
 pub use statistics::{
-    CacheReport, CostReport, FaceCost, GeometryReport, GroupReport, MemoryReport, MeshCost, PhaseSeconds,
-    PictureReport, RayReport, RenderStatistics, Seconds,
+    CacheReport, CostReport, DepartureReport, FaceCost, GeometryReport, GroupReport, MemoryReport, MeshCost,
+    PhaseSeconds, PictureReport, RayReport, RenderStatistics, Seconds,
 };
 pub use tradeoff::{Tradeoff, TradeoffRun};
 pub use tuning::{CurvePoint, RecordedRender, Tuning};

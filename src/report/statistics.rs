@@ -3,6 +3,7 @@
 use crate::cache::CacheStatistics;
 use crate::render::{PixelCounts, RayCounts, RenderSettings, Rendered};
 use crate::scene::costs::BuildCosts;
+use crate::scene::departure::DepartureCounts;
 use crate::scene::world::World;
 use serde::Serialize;
 
@@ -27,6 +28,8 @@ pub struct RenderStatistics {
     pub cache: CacheReport,
     /// Where blocks were built.
     pub costs: CostReport,
+    /// Rays that leave a patch.
+    pub departures: DepartureReport,
     /// Memory of the process.
     pub memory: MemoryReport,
     /// Time by phase.
@@ -103,19 +106,29 @@ pub struct GeometryReport {
     pub control_faces: usize,
     /// Patches of all meshes.
     pub patches: usize,
-    /// Patches of which at least one grid was built.
+    /// Patches of which some ray asked for a block.
     pub patches_touched: usize,
     /// Grid pieces built, rebuilt ones included.
     pub grids_built: u64,
-    /// Bytes that stay for the whole render: control meshes, plans, bounds, top level.
+    /// Bytes that stay for the whole render: control meshes, plans, bounds, top level, slots.
     pub resident_bytes: u64,
     /// Triangles of the full tessellation.
     pub full_triangles: u64,
-    /// Bytes of the full tessellation with its hierarchy, in the cache's own format.
+    /// Bytes of the full tessellation with its hierarchy, estimated: in the cache's own format, with 3 bytes a coordinate.
     pub full_bytes: u64,
 }
 
-/// The cache's counters. `lookups = hits + compulsory_misses + capacity_misses + other_misses`.
+/// What is remembered of patches that rays leave, and the rays that it spared a walk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct DepartureReport {
+    /// Horizons and skylines found, rays that they let pass.
+    #[serde(flatten)]
+    pub counts: DepartureCounts,
+    /// Bytes of the tables, beside `geometry.resident_bytes`.
+    pub bytes: u64,
+}
+
+/// The cache's counters. `lookups = hits + private_hits + compulsory_misses + capacity_misses + other_misses`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CacheReport {
     /// Size in bytes; `None` (null) if unbounded.

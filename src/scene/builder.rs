@@ -1,6 +1,7 @@
 //! Building a missing block: a patch's rates, then the vertices of a piece or the boxes of a node's children.
 
 use super::costs::BuildCosts;
+use super::departure::DepartureCounts;
 use super::world::{GridCache, WorldMesh};
 use crate::cache::{Block, BlockLayout, Claim, Recorder, Slot, SlotId, Visit};
 use crate::grid::{
@@ -46,6 +47,7 @@ pub(super) struct Builder<'w> {
     pub n_pieces: u64,
     pub n_triangles: u64,
     pub costs: BuildCosts,
+    pub departures: DepartureCounts,
     /// Rates of the last patches, one for each remainder of patch numbers.
     rates: [Option<(MeshId, PatchId, PatchRates)>; N_RATES],
     /// Notes every block that is asked for, if the cache wants to know.

@@ -15,6 +15,8 @@ use crate::grid::{CellRect, Horizon, LatticeRay, NodeView, Skyline};
 use crate::ids::{MeshId, PatchId};
 use crate::math::simd::{self, Kernel};
 use crate::math::{PrimitiveRef, Ray};
+use serde::Serialize;
+use std::ops::AddAssign;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Patches whose horizons are remembered at most: 2 MiB. With a quarter of them, occlusion, diffuse and shuffled rays on meshes of 30,000 faces (38,000 to
@@ -73,6 +75,26 @@ impl Openness {
         n < FIRST_SKYLINES
             || self.sum.load(Ordering::Relaxed) >= n * u64::from(LEAST_OPENNESS)
             || self.n_passed_over.fetch_add(1, Ordering::Relaxed) % PATCHES_PER_TRY == PATCHES_PER_TRY - 1
+    }
+}
+
+/// What is known of the rays that left patches, and of the patches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct DepartureCounts {
+    /// Horizons found, those that were forgotten and found again counted again.
+    pub horizons: u64,
+    /// Skylines found, likewise.
+    pub skylines: u64,
+    /// Rays that left above a skyline, and were not walked at all. (Those that pass their own patch by alone are too many to be
+    /// counted: primary rays ran at 0.99 of the speed.)
+    pub rays_past_all: u64,
+}
+
+impl AddAssign for DepartureCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.horizons += other.horizons;
+        self.skylines += other.skylines;
+        self.rays_past_all += other.rays_past_all;
     }
 }
 
@@ -202,6 +224,7 @@ impl Departures {
             return false;
         }
         let horizon = left.horizon(ray);
+        left.builder.departures.horizons += 1;
         self.horizons.put(number, horizon.to_words());
         horizon.is_cleared_by(simd::Portable, ray)
     }
@@ -235,6 +258,7 @@ impl Departures {
         }
         let skyline = skyline::of_patch(of, ray, cache, builder, &pin.visit());
         openness.note(skyline.openness());
+        builder.departures.skylines += 1;
         match skyline {
             Skyline::NONE => self.skylines.put_off(number),
             skyline => self.skylines.put(number, skyline.to_words()),

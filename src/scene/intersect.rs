@@ -93,9 +93,11 @@ impl Task for ClosestInMesh<'_, '_> {
         let mesh = world.mesh(id);
         let entering = mesh.entrance().ray(kernel, ray);
         let start = cache.departures().start(ray, id, mesh);
-        if cache.departures().meets_nothing(kernel, start, entering[1], mesh)
-            || !mesh.entrance().is_in_reach(kernel, entering)
-        {
+        if cache.departures().meets_nothing(kernel, start, entering[1], mesh) {
+            builder.departures.rays_past_all += 1;
+            return None;
+        }
+        if !mesh.entrance().is_in_reach(kernel, entering) {
             return None;
         }
         let in_lattice = &lattice_ray(kernel, entering, id, ray, t_max);
@@ -190,9 +192,11 @@ impl Task for OccludedInMesh<'_, '_> {
         let mesh = world.mesh(id);
         let entering = mesh.entrance().ray(kernel, ray);
         let start = cache.departures().start(ray, id, mesh);
-        if cache.departures().meets_nothing(kernel, start, entering[1], mesh)
-            || !mesh.entrance().is_in_reach(kernel, entering)
-        {
+        if cache.departures().meets_nothing(kernel, start, entering[1], mesh) {
+            builder.departures.rays_past_all += 1;
+            return false;
+        }
+        if !mesh.entrance().is_in_reach(kernel, entering) {
             return false;
         }
         let in_lattice = &lattice_ray(kernel, entering, id, ray, ray.t_max);
@@ -371,8 +375,9 @@ fn triangle_id(of: &PrimitiveRef) -> TriangleId {
 
 impl Drop for Intersector<'_> {
     fn drop(&mut self) {
-        let costs = std::mem::take(&mut self.builder.costs);
-        self.cache.add_built(self.builder.n_pieces, self.builder.n_triangles, costs);
+        let Builder { n_pieces, n_triangles, costs, departures, .. } = &mut self.builder;
+        self.cache.add_built(*n_pieces, *n_triangles, std::mem::take(costs));
+        self.cache.add_departures(*departures);
     }
 }
 

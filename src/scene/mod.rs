@@ -9,7 +9,7 @@ mod builder;
 pub mod camera;
 pub mod compile;
 pub mod costs;
-mod departure;
+pub mod departure;
 pub mod description;
 mod entrance;
 pub mod intersect;

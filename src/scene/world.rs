@@ -2,7 +2,7 @@
 
 use super::accel::{BUILD_BYTES_PER_PATCH, LeafRef, TopLevel};
 use super::costs::BuildCosts;
-use super::departure::Departures;
+use super::departure::{DepartureCounts, Departures};
 use super::description::MeshDescription;
 use super::entrance::Entrance;
 use super::rate::DicingRate;
@@ -438,6 +438,7 @@ pub struct GridCache {
     triangles_built: AtomicU64,
     pieces_built: AtomicU64,
     costs: Mutex<BuildCosts>,
+    departure_counts: Mutex<DepartureCounts>,
     trace: Option<TraceLog>,
 }
 
@@ -455,6 +456,7 @@ impl GridCache {
             triangles_built: AtomicU64::new(0),
             pieces_built: AtomicU64::new(0),
             costs: Mutex::default(),
+            departure_counts: Mutex::default(),
             trace: None,
             segments,
         })
@@ -498,6 +500,15 @@ impl GridCache {
         self.costs.lock().merge(costs);
         self.pieces_built.fetch_add(pieces, Ordering::Relaxed);
         self.triangles_built.fetch_add(triangles, Ordering::Relaxed);
+    }
+
+    pub(super) fn add_departures(&self, counts: DepartureCounts) {
+        *self.departure_counts.lock() += counts;
+    }
+
+    /// What tracers that have ended know of the rays that left patches.
+    pub fn departure_counts(&self) -> DepartureCounts {
+        *self.departure_counts.lock()
     }
 
     /// Blocks built by tracers that have ended, by mesh and patch.
