@@ -26,8 +26,8 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-/// Bytes that stay resident after meshes have been prepared besides what was made: code that ran for the first time, and
-/// what the allocator keeps for each thread. 3 MiB were seen with 2 threads.
+/// Bytes that stay resident after meshes have been prepared besides what was made: code that ran for the first time,
+/// and what the allocator keeps for each thread. 3 MiB were seen with 2 threads.
 const PREPARING_LEAVES: u64 = 4 << 20;
 
 /// A scene whose meshes have not been read.
@@ -116,6 +116,7 @@ impl<'a> RenderScene<'a> {
         let planned = |share: f64| self.check_plans(share, at_start);
         let world = compile(self.scene, meshes, &camera, height, threads, &|k| progress.set(k, n_faces), &planned)?;
         progress.finish();
+        self.warn_of_idle_tags(&world);
         Ok((world, camera))
     }
 
@@ -128,6 +129,19 @@ impl<'a> RenderScene<'a> {
         }
         let grown = resident.saturating_sub(at_start) as f64;
         Err(too_small_for("plan how irregular faces are split", budget, at_start + (grown / share) as u64))
+    }
+
+    /// Who counts vertices from 1 in a tag, which counts them from 0, creases nothing.
+    fn warn_of_idle_tags(&self, world: &World) {
+        for (mesh, description) in world.meshes().iter().zip(&self.scene.meshes) {
+            let (n, file) = (mesh.surface().topology().idle_creases(), description.file.display());
+            if n > 0 {
+                eprintln!(
+                    "lazytess: warning: {file}: {n} crease tags name vertices that share no edge, and do nothing; tags \
+                     count from 0"
+                );
+            }
+        }
     }
 
     /// Reads all meshes.

@@ -12,7 +12,8 @@ use crate::render::groups::NO_GROUP;
 use crate::render::sampler::pcg;
 use std::path::{Path, PathBuf};
 
-/// Display colours of reasons, by number: greys where nothing was found out, hues of edges, dark where nothing was traced.
+/// Display colours of reasons, by number: greys where nothing was found out, hues of edges, dark where nothing was
+/// traced.
 const REASON_COLORS: [[f32; 3]; 13] = [
     [0.65, 0.65, 0.65],
     [1.0, 1.0, 1.0],
@@ -29,10 +30,10 @@ const REASON_COLORS: [[f32; 3]; 13] = [
     [0.55, 0.8, 0.3],
 ];
 
-/// Writes a film whole, or leaves the file that was there.
-pub fn write_film(path: &Path, format: PictureFormat, film: &Film) -> Result<()> {
+/// Writes the film of a picture of that size whole, or leaves the file that was there.
+pub fn write_film(path: &Path, format: PictureFormat, film: &Film, size: [u32; 2]) -> Result<()> {
     match format {
-        PictureFormat::Exr => write_exr(path, &layers(film)),
+        PictureFormat::Exr => write_exr(path, &layers(film, size)),
         PictureFormat::Png => {
             write_png(path, film.window().width() as usize, display_pixels(film.colors()))?;
             film.planes().iter().try_for_each(|(aov, plane)| write_plane(path, film, *aov, plane))
@@ -74,7 +75,7 @@ fn error_colors(errors: &[f32]) -> Vec<[f32; 3]> {
     errors.iter().map(color).collect()
 }
 
-fn layers(film: &Film) -> ImageLayers {
+fn layers(film: &Film, size: [u32; 2]) -> ImageLayers {
     let (width, height) = (film.window().width() as usize, film.window().height() as usize);
     let color = |k: usize| ChannelData::F32(film.colors().iter().map(|c| c[k]).collect());
     let beauty = ["R", "G", "B"].iter().enumerate().map(|(k, name)| ((*name).to_owned(), color(k)));
@@ -89,7 +90,8 @@ fn layers(film: &Film) -> ImageLayers {
         // Plain channels live in the beauty layer, under their own names and at full precision in a layer apart.
         layers.push(Layer { name: name.to_owned(), channels: named, half: false });
     }
-    ImageLayers { width, height, layers }
+    let place = [film.window().x0, film.window().y0].map(|n| n as usize);
+    ImageLayers { width, height, place, whole: size.map(|n| n as usize), layers }
 }
 
 #[cfg(test)]

@@ -35,7 +35,8 @@ pub struct RenderArgs {
     /// Picture to write: .exr (linear, 16-bit half, layers) or .png (8-bit sRGB)
     #[arg(short, long, value_name = "OUT.exr|OUT.png")]
     pub output: PathBuf,
-    /// Further layers of the EXR file, such as Z,N,patch; group, reason and error get pictures beside a PNG
+    /// Further layers of the EXR file: Z, N, mesh, patch, uv, samples, miss, build, group, reason, error. The last
+    /// three get pictures beside a PNG; miss and build show the cache at work and depend on it
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = PICTURE)]
     pub aov: Vec<Aov>,
     /// Write the statistics as JSON
@@ -162,7 +163,7 @@ impl RenderJob {
         // Writing needs memory, too, and the budget counts on this.
         drop(cache);
         let watch = Stopwatch::start();
-        output::write_film(&self.output, self.format, &rendered.film)?;
+        output::write_film(&self.output, self.format, &rendered.film, self.settings.size)?;
         if let Some(mut statistics) = statistics {
             statistics.seconds.write = watch.seconds().into();
             statistics.memory.peak_resident_bytes = peak_resident_bytes();

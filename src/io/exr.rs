@@ -9,13 +9,18 @@ use std::path::Path;
 
 /// Writes all layers as channels of one part, which every viewer reads: `R`, `G`, `B`, `Z`, `N.X`, ...
 ///
-/// Lossless, one thread, no date: equal pictures give equal files.
+/// Lossless, one thread, no date: equal pictures give equal files. A part of a picture is the data window, the whole
+/// the display window.
 pub fn write_exr(path: &Path, picture: &ImageLayers) -> Result<()> {
     let channels = picture.layers.iter().flat_map(layer_channels).collect();
     let size = Vec2(picture.width, picture.height);
     let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::SMALL_FAST_LOSSLESS };
-    let layer = ::exr::image::Layer::new(size, LayerAttributes::default(), encoding, AnyChannels::sort(channels));
-    let image = Image::from_layer(layer);
+    let [x, y] = picture.place.map(|n| n as i32);
+    let attributes = LayerAttributes { layer_position: Vec2(x, y), ..LayerAttributes::default() };
+    let layer = ::exr::image::Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
+    let mut image = Image::from_layer(layer);
+    let [width, height] = picture.whole;
+    image.attributes.display_window = IntegerBounds::from_dimensions(Vec2(width, height));
     write_whole(path, |out| image.write().non_parallel().to_buffered(out).map_err(io_error))
 }
 
@@ -87,7 +92,7 @@ mod tests {
         let normal = Layer { name: "N".into(), channels: vec![("X".into(), ramp(0.1))], half: false };
         let ids = ChannelData::U32(vec![0, 1, 2, 3, 16_777_217, u32::MAX]);
         let id = Layer { name: String::new(), channels: vec![("id".into(), ids)], half: false };
-        ImageLayers { width: 3, height: 2, layers: vec![beauty, depth, normal, id] }
+        ImageLayers { width: 3, height: 2, place: [1, 4], whole: [9, 7], layers: vec![beauty, depth, normal, id] }
     }
 
     #[test]
@@ -96,6 +101,8 @@ mod tests {
         let path = folder.path().join("a.exr");
         write_exr(&path, &picture()).unwrap();
         let back = read_all_flat_layers_from_file(&path).unwrap();
+        assert_eq!(back.layer_data[0].attributes.layer_position, Vec2(1, 4));
+        assert_eq!(back.attributes.display_window, IntegerBounds::from_dimensions(Vec2(9, 7)));
         let channels = &back.layer_data[0].channel_data.list;
         let kinds: Vec<_> =
             channels.iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().count())).collect();

@@ -1,7 +1,7 @@
 //! Control meshes as OBJ with tags, written as they come: nothing but one line is held.
 //!
-//! Numbers are written in the shortest form that reads back as the same `f64`, so a mesh survives the way through a file
-//! bit for bit (an infinite sharpness is written as 10, which means the same).
+//! Numbers are written in the shortest form that reads back as the same `f64`, so a mesh survives the way through a
+//! file bit for bit (an infinite sharpness is written as 10, which means the same).
 
 use super::write::write_whole;
 use crate::error::Result;
@@ -41,28 +41,12 @@ impl<W: Write> ObjWriter<W> {
     /// Writes a whole mesh with all its tags.
     pub fn mesh(&mut self, mesh: &ControlMesh) -> io::Result<()> {
         mesh.positions.iter().try_for_each(|&p| self.vertex(p))?;
-        self.polygons(mesh)?;
+        mesh.faces().try_for_each(|face| self.face(face))?;
         self.rules(mesh)?;
         mesh.creases.iter().try_for_each(|&crease| self.crease(crease))?;
         mesh.corners.iter().try_for_each(|&corner| self.corner(corner))?;
         mesh.holes.iter().try_for_each(|face| self.write(format_args!("t hole 1/0/0 {face}")))?;
         mesh.edits.iter().try_for_each(|edit| self.edit(edit))
-    }
-
-    fn polygons(&mut self, mesh: &ControlMesh) -> io::Result<()> {
-        let Some(tex) = &mesh.tex_coords else { return mesh.faces().try_for_each(|face| self.face(face)) };
-        for uv in &tex.values {
-            self.write(format_args!("vt {} {}", uv.x, uv.y))?;
-        }
-        let mut indices = tex.indices.iter();
-        for face in mesh.faces() {
-            self.line.push('f');
-            for (v, uv) in face.iter().zip(&mut indices) {
-                let _ = write!(self.line, " {}/{}", v.0 + 1, uv + 1);
-            }
-            self.end_line()?;
-        }
-        Ok(())
     }
 
     fn rules(&mut self, mesh: &ControlMesh) -> io::Result<()> {
@@ -142,8 +126,7 @@ mod tests {
     use super::*;
     use crate::ids::FaceId;
     use crate::io::obj::parse_obj;
-    use crate::mesh::{TexCoords, shapes};
-    use glam::Vec2;
+    use crate::mesh::shapes;
 
     fn through_text(mesh: &ControlMesh) -> ControlMesh {
         let mut text = Vec::new();
@@ -175,14 +158,10 @@ mod tests {
     }
 
     #[test]
-    fn texture_coordinates_and_edits_survive() {
+    fn holes_and_edits_survive() {
         let cube = shapes::hole_cube();
         let edit = |kind, path: &[u32], value| Edit { kind, path: path.to_vec(), value };
         let mesh = ControlMesh {
-            tex_coords: Some(TexCoords {
-                values: vec![Vec2::new(0.25, 0.1), Vec2::ONE],
-                indices: (0..24).map(|i| i % 2).collect(),
-            }),
             edits: vec![
                 edit(EditKind::Vertex, &[0, 1, 2, 3], EditValue::AddPosition(DVec3::new(0.1, 2.0, -3.0))),
                 edit(EditKind::Vertex, &[0, 1], EditValue::SetPosition(DVec3::ONE)),

@@ -19,6 +19,10 @@ pub struct ImageLayers {
     pub width: usize,
     /// Rows.
     pub height: usize,
+    /// Column and row of the first pixel in the whole picture.
+    pub place: [usize; 2],
+    /// Columns and rows of the whole picture.
+    pub whole: [usize; 2],
     /// Layers; their names differ.
     pub layers: Vec<Layer>,
 }
@@ -102,7 +106,8 @@ mod tests {
         png::write_png(&png, 5, [[0.25, 0.5, 1.0]; 20]).unwrap();
         let channel = |name: &str| (name.to_owned(), ChannelData::F32(vec![0.5; 20]));
         let layer = Layer { name: String::new(), channels: ["R", "G", "B"].map(channel).into(), half: true };
-        exr::write_exr(&exr, &ImageLayers { width: 5, height: 4, layers: vec![layer] }).unwrap();
+        exr::write_exr(&exr, &ImageLayers { width: 5, height: 4, place: [0, 0], whole: [5, 4], layers: vec![layer] })
+            .unwrap();
         [png, exr].map(|path| std::fs::read(path).unwrap())
     }
 

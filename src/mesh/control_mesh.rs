@@ -4,7 +4,7 @@ use super::edit::Edit;
 use crate::error::{Error, Result};
 use crate::ids::{FaceId, VertexId};
 use crate::math::DBounds;
-use glam::{DVec3, Vec2};
+use glam::DVec3;
 
 /// What happens at the mesh's boundary (`t interpolateboundary 1/0/0 k`).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -56,22 +56,6 @@ pub struct Corner {
     pub sharpness: f32,
 }
 
-/// Texture coordinates per face corner (`vt`).
-#[derive(Clone, PartialEq, Debug, Default)]
-pub struct TexCoords {
-    /// Coordinate values.
-    pub values: Vec<Vec2>,
-    /// One index into `values` per face corner, parallel to [`ControlMesh::face_vertices`].
-    pub indices: Vec<u32>,
-}
-
-impl TexCoords {
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        size_of_val(&*self.values) + size_of_val(&*self.indices)
-    }
-}
-
 /// A validated control mesh.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct ControlMesh {
@@ -81,8 +65,6 @@ pub struct ControlMesh {
     pub face_sizes: Vec<u32>,
     /// Vertices of all faces, one face after the other.
     pub face_vertices: Vec<VertexId>,
-    /// Texture coordinates, if every face has them. They go from file to file; nothing that is traced has any.
-    pub tex_coords: Option<TexCoords>,
     /// Sharp edges; a tag on a pair that is no edge has no effect.
     pub creases: Vec<Crease>,
     /// Sharp vertices.
@@ -100,8 +82,8 @@ pub struct ControlMesh {
 }
 
 impl ControlMesh {
-    /// Corners that a face can have: what is known of a polygon takes 4 bytes for each pair of its corners, and several times as
-    /// much while it is found out.
+    /// Corners that a face can have: what is known of a polygon takes 4 bytes for each pair of its corners, and several
+    /// times as much while it is found out.
     pub const MOST_CORNERS: u32 = 4096;
 
     /// A mesh of polygons without tags.
@@ -164,10 +146,9 @@ impl ControlMesh {
         self.edits.iter().try_for_each(|edit| edit.validate(&self.face_sizes))
     }
 
-    /// Bytes held by positions, polygons and texture coordinates.
+    /// Bytes held by positions and polygons.
     pub fn bytes(&self) -> usize {
-        let tex_coords = self.tex_coords.as_ref().map_or(0, TexCoords::bytes);
-        size_of_val(&*self.positions) + size_of_val(&*self.face_sizes) + size_of_val(&*self.face_vertices) + tex_coords
+        size_of_val(&*self.positions) + size_of_val(&*self.face_sizes) + size_of_val(&*self.face_vertices)
     }
 
     /// Number of faces.

@@ -12,9 +12,9 @@
 //!     0───────────1                 0─────┴─────1
 //! ```
 //!
-//! Vertices of a child run as its parent's do: for child i of a quad, vertex i is the parent's vertex i, i+1 the point of
-//! edge i, i+2 the face point, i+3 the point of edge i-1 (modulo 4). Children of faces that are no quads have the same four
-//! points as vertices 0, 1, 2, 3. Edge e of a face goes from its vertex e to vertex e+1.
+//! Vertices of a child run as its parent's do: for child i of a quad, vertex i is the parent's vertex i, i+1 the point
+//! of edge i, i+2 the face point, i+3 the point of edge i-1 (modulo 4). Children of faces that are no quads have the
+//! same four points as vertices 0, 1, 2, 3. Edge e of a face goes from its vertex e to vertex e+1.
 
 use crate::error::{Error, Result};
 use crate::ids::FaceId;
@@ -33,8 +33,8 @@ pub enum EditKind {
 
 /// The change.
 ///
-/// `subtract` is an addition of the negated value. Sharpness is stored as a number from 0 to 10, 10 being infinite, and is
-/// clamped to that range after the change: an infinitely sharp edge with -3 added has sharpness 7.
+/// `subtract` is an addition of the negated value. Sharpness is stored as a number from 0 to 10, 10 being infinite, and
+/// is clamped to that range after the change: an infinitely sharp edge with -3 added has sharpness 7.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum EditValue {
     /// Add to the position (`add P value`); vertices only.
@@ -51,17 +51,18 @@ pub enum EditValue {
 
 /// A hierarchical edit: an element of the refined mesh and a change to it.
 ///
-/// The edits of one level are applied in file order, when that level has been computed and before the next step (those of
-/// level 0 after the boundary rule). So several additions add up, and of several replacements the last one holds. An
+/// The edits of one level are applied in file order, when that level has been computed and before the next step (those
+/// of level 0 after the boundary rule). So several additions add up, and of several replacements the last one holds. An
 /// element that several faces share may be named through any of them.
 ///
-/// Boundary edges, non-manifold edges and vertices that are infinitely sharp for being non-manifold stay infinitely sharp.
+/// Boundary edges, non-manifold edges and vertices that are infinitely sharp for being non-manifold stay infinitely
+/// sharp.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Edit {
     /// Kind of element.
     pub kind: EditKind,
-    /// Base face (from 0), then a child for each step, and last, for vertices and edges only, the number of the vertex or
-    /// edge in the face reached. This is the tag's path without the leading length.
+    /// Base face (from 0), then a child for each step, and last, for vertices and edges only, the number of the vertex
+    /// or edge in the face reached. This is the tag's path without the leading length.
     pub path: Vec<u32>,
     /// The change.
     pub value: EditValue,

@@ -1,8 +1,8 @@
 //! Random control meshes for fuzzing: small, seeded, and full of what real files have only in places.
 //!
 //! [`random_mesh`] starts from a shape of the corpus, a grid or a heap of faces, **damages** it (faces split, merged,
-//! removed, doubled, turned over, vertices welded or repeated, fins added), then draws tags. The result is always valid, often
-//! non-manifold. [`random_edits`] adds hierarchical edits.
+//! removed, doubled, turned over, vertices welded or repeated, fins added), then draws tags. The result is always
+//! valid, often non-manifold. [`random_edits`] adds hierarchical edits.
 //!
 //! The same seed gives the same mesh on every machine.
 

@@ -1,12 +1,13 @@
 //! Procedural control meshes: for tests, for the scenes that ship, and for `lazytess generate`.
 //!
-//! A **shape** is a small mesh made by a function without files. [`all`] is the **corpus**: a table of named shapes that
-//! tests iterate, [`all_closed`] the part of it whose limit surface has no boundary, so that no ray may pass through it.
-//! A generator writes a mesh of any size into a [`MeshSink`](super::MeshSink).
+//! A **shape** is a small mesh made by a function without files. [`all`] is the **corpus**: a table of named shapes
+//! that tests iterate, [`all_closed`] the part of it whose limit surface has no boundary, so that no ray may pass
+//! through it. A generator writes a mesh of any size into a [`MeshSink`](super::MeshSink).
 //!
 //! # Invariants
-//! Faces run counter-clockwise seen from outside; y points up; scene shapes stand on the plane y = 0. The same arguments
-//! give the same mesh on every machine: random choices come from hashes, and coordinates are rounded after using a sine.
+//! Faces run counter-clockwise seen from outside; y points up; scene shapes stand on the plane y = 0. The same
+//! arguments give the same mesh on every machine: random choices come from hashes, and coordinates are rounded after
+//! using a sine.
 
 mod basic;
 pub mod chess;

@@ -40,7 +40,6 @@ fn candidates(mesh: &ControlMesh) -> impl Iterator<Item = ControlMesh> {
 
 fn changed(mesh: &ControlMesh, change: impl FnOnce(&mut ControlMesh)) -> ControlMesh {
     let mut mesh = mesh.clone();
-    mesh.tex_coords = None;
     change(&mut mesh);
     mesh
 }

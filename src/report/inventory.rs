@@ -127,6 +127,7 @@ fn sum(a: &MeshCounts, b: &MeshCounts) -> MeshCounts {
         nonmanifold_vertices: a.nonmanifold_vertices + b.nonmanifold_vertices,
         hidden_faces: a.hidden_faces + b.hidden_faces,
         creased_edges: a.creased_edges + b.creased_edges,
+        idle_creases: a.idle_creases + b.idle_creases,
     }
 }
 
@@ -204,7 +205,7 @@ impl Inventory {
         let parts: Vec<_> = parts.iter().map(|(bytes, name)| format!("{name} {}", Bytes(*bytes as u64))).collect();
         writeln!(f, "resident  {} ({:.0} bytes a face): {}", Bytes(r.total as u64), r.per_face, parts.join(", "))?;
         let (triangles, pieces) = (Count(full.triangles), Count(full.pieces));
-        writeln!(f, "in full   {triangles} triangles in {pieces} grid pieces, {}", Bytes(full.bytes))?;
+        writeln!(f, "in full   {triangles} triangles in {pieces} grid pieces, about {}", Bytes(full.bytes))?;
         writeln!(f, "cache     {} recommended: {}", Bytes(self.cache.bytes), self.cache.reason)
     }
 }
@@ -221,7 +222,8 @@ fn histogram(counts: &BTreeMap<u32, usize>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes;
+    use crate::ids::VertexId;
+    use crate::mesh::{Crease, shapes};
     use crate::scene::rate::DicingRate;
     use glam::DAffine3;
 
@@ -254,6 +256,10 @@ mod tests {
         assert_eq!(sheet.valences, BTreeMap::from([(2, 4), (3, 6), (4, 2)]));
         let cube = inventory(shapes::crease_cube(2.0));
         assert!(cube.tags.creases > 0 && cube.topology.creased_edges == cube.tags.creases);
+        let mut mesh = shapes::crease_cube(2.0);
+        mesh.creases.push(Crease { edge: [VertexId(3); 2], sharpness: 1.0 });
+        let counts = inventory(mesh).topology;
+        assert_eq!((counts.creased_edges, counts.idle_creases), (cube.topology.creased_edges, 1));
     }
 
     #[test]

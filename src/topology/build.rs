@@ -40,6 +40,8 @@ pub struct Topology {
     pub crease_method: CreaseMethod,
     /// Edge weights beside triangles.
     pub triangles: TriangleRule,
+    /// Crease tags on vertex pairs that are no edge: they do nothing.
+    idle_creases: usize,
 }
 
 /// Counts for reports.
@@ -55,6 +57,8 @@ pub struct MeshCounts {
     pub hidden_faces: usize,
     /// Edges with a crease tag and two faces.
     pub creased_edges: usize,
+    /// Crease tags on vertex pairs that are no edge: they do nothing.
+    pub idle_creases: usize,
 }
 
 fn get_bit(bits: &[u64], i: u32) -> bool {
@@ -88,6 +92,7 @@ impl Topology {
             hidden: None,
             crease_method: mesh.crease_method,
             triangles: mesh.triangles,
+            idle_creases: 0,
         };
         let by_vertex = HalfEdgesByVertex::new(&topology, n_threads);
         let (twin, tangles) = by_vertex.pair(&topology, n_threads);
@@ -143,6 +148,8 @@ impl Topology {
             } else {
                 infinite.remove(&[a, b]);
             }
+            let at_ends = by_vertex.lower(a).iter().filter(|&&h| ends(self, h).1 == b);
+            self.idle_creases += usize::from(at_ends.count() == 0);
             for &h in by_vertex.lower(a) {
                 if ends(self, h).1 == b && self.twin[h as usize] != NONE {
                     self.edge_sharpness.insert(h.min(self.twin[h as usize]), sharpness);
@@ -382,7 +389,8 @@ impl Topology {
         }
     }
 
-    /// Non-manifold edges and vertices that a hidden face speaks for get another owner: alone, each sheet would round for itself.
+    /// Non-manifold edges and vertices that a hidden face speaks for get another owner: alone, each sheet would round
+    /// for itself.
     fn let_visible_faces_own(&mut self) {
         let mut smallest: FxHashMap<u32, u32> = FxHashMap::default();
         for (&h, &owner) in self.nonmanifold_edge_owner.iter().filter(|(h, _)| !self.is_hidden(FaceId(self.face(**h))))
@@ -431,6 +439,11 @@ impl Topology {
         is_polygon(h) || (twin != NONE && is_polygon(twin)) || self.nonmanifold_edge_owner.contains_key(&h)
     }
 
+    /// Crease tags on vertex pairs that are no edge.
+    pub fn idle_creases(&self) -> usize {
+        self.idle_creases
+    }
+
     /// Counts for reports.
     pub fn counts(&self) -> MeshCounts {
         let hidden = self.hidden.as_ref().map_or(0, |bits| bits.iter().map(|w| w.count_ones() as usize).sum());
@@ -441,6 +454,7 @@ impl Topology {
             nonmanifold_vertices: self.nonmanifold_tags.len(),
             hidden_faces: hidden,
             creased_edges: self.edge_sharpness.len(),
+            idle_creases: self.idle_creases,
         }
     }
 

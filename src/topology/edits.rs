@@ -43,8 +43,8 @@ fn level_0(mesh: &ControlMesh, kind: EditKind) -> impl Iterator<Item = (&Edit, u
 }
 
 impl Topology {
-    /// Where a face passes an edge again, and where an edge leads back to its vertex, that is an edge of its own. It looks
-    /// the same until an edit moves the one and not the other, so under edits neither speaks for the other.
+    /// Where a face passes an edge again, and where an edge leads back to its vertex, that is an edge of its own. It
+    /// looks the same until an edit moves the one and not the other, so under edits neither speaks for the other.
     pub(super) fn separate_passages(&mut self) {
         let mut half_edges: Vec<u32> = self.nonmanifold_edge_owner.keys().copied().collect();
         half_edges.sort_unstable();

@@ -1,5 +1,5 @@
-//! From what faces are numbered by in turn, half-edges or patches, to the face and back: in a quarter of a byte each for mixed
-//! polygons, and none for quads.
+//! From what faces are numbered by in turn, half-edges or patches, to the face and back: in a quarter of a byte each
+//! for mixed polygons, and none for quads.
 
 /// Where each face's half-edges start, or its patches.
 #[derive(Debug)]

@@ -43,8 +43,8 @@ pub trait HalfEdges {
     /// Tags of the vertex where `h` starts.
     fn vertex_tags(&self, h: u32) -> VertexTags;
 
-    /// Whether the vertex where `h` starts is known to be smooth, with smooth edges, borders aside, which have no other side
-    /// then; `false` may mean anything.
+    /// Whether the vertex where `h` starts is known to be smooth, with smooth edges, borders aside, which have no other
+    /// side then; `false` may mean anything.
     fn is_plain(&self, h: u32) -> bool;
 
     /// Number of infinitely sharp edges at the vertex where `h` starts, all sectors counted.

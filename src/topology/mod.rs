@@ -1,8 +1,8 @@
 //! Who is beside whom: **half-edges** over a control mesh, and which edges and vertices are sharp.
 //!
 //! A half-edge is the side of an edge that belongs to one face. It starts at a vertex, runs along the face's boundary
-//! counter-clockwise, and its **twin** runs the other way in the face beside it. Half-edges are numbered face by face in
-//! file order, so "next" and "previous" need no storage.
+//! counter-clockwise, and its **twin** runs the other way in the face beside it. Half-edges are numbered face by face
+//! in file order, so "next" and "previous" need no storage.
 //!
 //! ```text
 //!          v3 ◀──h2── v2        next(h0) = h1, prev(h0) = h3

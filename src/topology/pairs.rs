@@ -1,4 +1,5 @@
-//! Which half-edges lie along the same edge: sorted by their smaller vertex, then paired vertex by vertex, on all threads.
+//! Which half-edges lie along the same edge: sorted by their smaller vertex, then paired vertex by vertex, on all
+//! threads.
 
 use super::Topology;
 use super::half_edges::{HalfEdges, NONE};

@@ -97,7 +97,6 @@ fn parse_plain(block: &Block) -> Option<MeshBuilder> {
         let mut words = words(line.text);
         match words.next() {
             Some(b"v") => part.vertex(words).ok()?,
-            Some(b"vt") => part.tex_coord(words).ok()?,
             Some(b"f") if !line.text.contains(&b'-') => part.face(words).ok()?,
             Some(comment) if comment[0] == b'#' => {}
             Some(known) if PASSED_OVER.contains(&known) => {}

@@ -6,8 +6,8 @@
 use super::ObjMesh;
 use crate::error::{Error, Result};
 use crate::ids::{FaceId, VertexId};
-use crate::mesh::{ControlMesh, Corner, Crease, Edit, TexCoords};
-use glam::{DVec3, Vec2};
+use crate::mesh::{ControlMesh, Corner, Crease, Edit};
+use glam::DVec3;
 use std::path::Path;
 
 /// Coordinates beyond this are refused: squares of differences must stay far from the end of f64 and f32.
@@ -56,11 +56,8 @@ impl Reach {
 pub struct MeshBuilder {
     /// Rules are set here directly by tags.
     pub mesh: ControlMesh,
-    tex_coords: TexCoords,
-    some_corner_without_tex_coord: bool,
     line: usize,
     reach_of_faces: Reach,
-    reach_of_tex_coords: Reach,
     reach_of_tags_to_vertices: Reach,
     reach_of_tags_to_faces: Reach,
     edit_lines: Vec<usize>,
@@ -95,14 +92,6 @@ impl MeshBuilder {
         words.try_for_each(|word| number(word).map(drop))
     }
 
-    /// `vt u [v [w]]`.
-    pub fn tex_coord<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
-        let u = words.next().ok_or("a texture coordinate needs u")?;
-        let v = words.next().map_or(Ok(0.0), number)?;
-        self.tex_coords.values.push(Vec2::new(number(u)? as f32, v as f32));
-        Ok(())
-    }
-
     /// `f a b c ...` with corners `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     pub fn face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>) -> Result<(), String> {
         let first = self.mesh.face_vertices.len();
@@ -124,28 +113,12 @@ impl MeshBuilder {
         let vertex = resolve(vertex, self.mesh.positions.len(), "vertex")?;
         self.reach_of_faces.note(vertex, self.line);
         self.mesh.face_vertices.push(VertexId(vertex));
-        let tex_coord = parts.next().filter(|part| !part.is_empty());
-        // Normals are not used, but a corner that is no corner is reported.
-        if let Some(normal) = parts.next().filter(|part| !part.is_empty()) {
-            integer(normal)?;
+        // Texture coordinates and normals are not used, but a corner that is no corner is reported.
+        for unused in parts.by_ref().take(2).filter(|part| !part.is_empty()) {
+            integer(unused)?;
         }
         if parts.next().is_some() {
             return Err(format!("corner {} has more than three parts", show(word)));
-        }
-        self.corner_tex_coord(tex_coord)
-    }
-
-    /// Texture coordinates are kept as long as every corner has one.
-    fn corner_tex_coord(&mut self, part: Option<&[u8]>) -> Result<(), String> {
-        let Some(part) = part else {
-            self.some_corner_without_tex_coord = true;
-            self.tex_coords.indices = Vec::new();
-            return Ok(());
-        };
-        let index = resolve(part, self.tex_coords.values.len(), "texture coordinate")?;
-        self.reach_of_tex_coords.note(index, self.line);
-        if !self.some_corner_without_tex_coord {
-            self.tex_coords.indices.push(index);
         }
         Ok(())
     }
@@ -180,15 +153,7 @@ impl MeshBuilder {
         self.mesh.positions.extend_from_slice(&part.mesh.positions);
         self.mesh.face_sizes.extend_from_slice(&part.mesh.face_sizes);
         self.mesh.face_vertices.extend_from_slice(&part.mesh.face_vertices);
-        self.tex_coords.values.extend_from_slice(&part.tex_coords.values);
-        self.some_corner_without_tex_coord |= part.some_corner_without_tex_coord;
-        if self.some_corner_without_tex_coord {
-            self.tex_coords.indices = Vec::new();
-        } else {
-            self.tex_coords.indices.extend_from_slice(&part.tex_coords.indices);
-        }
         self.reach_of_faces.append(part.reach_of_faces);
-        self.reach_of_tex_coords.append(part.reach_of_tex_coords);
     }
 
     /// The whole mesh, checked.
@@ -198,11 +163,9 @@ impl MeshBuilder {
             return Err(Error::input("the mesh has no faces ('f' lines); is this an OBJ file?").at(path, None));
         }
         self.reach_of_faces.check("vertex", 1, n_vertices, path)?;
-        self.reach_of_tex_coords.check("texture coordinate", 1, self.tex_coords.values.len(), path)?;
         self.reach_of_tags_to_vertices.check("vertex", 0, n_vertices, path)?;
         self.reach_of_tags_to_faces.check("face", 0, n_faces, path)?;
         self.check_edit_paths(path)?;
-        self.mesh.tex_coords = (!self.some_corner_without_tex_coord).then_some(self.tex_coords);
         shrink(&mut self.mesh);
         self.mesh.validate().map_err(|e| e.at(path, None))?;
         let place = |line: usize, message: &str| format!("{}:{line}: {message}", path.display());
@@ -222,10 +185,6 @@ fn shrink(mesh: &mut ControlMesh) {
     mesh.positions.shrink_to_fit();
     mesh.face_sizes.shrink_to_fit();
     mesh.face_vertices.shrink_to_fit();
-    if let Some(tex_coords) = &mut mesh.tex_coords {
-        tex_coords.values.shrink_to_fit();
-        tex_coords.indices.shrink_to_fit();
-    }
 }
 
 /// An index from 1, or negative and relative to the elements so far, as an index from 0.

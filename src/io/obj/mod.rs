@@ -16,10 +16,10 @@
 //! t vertexedit | edgeedit | faceedit    hierarchical edits (RISpec 3.2), see `edits.rs`
 //! ```
 //!
-//! The file is read once, in blocks of a megabyte that threads parse side by side (`blocks.rs`): besides the mesh only a few
-//! of them are in memory. Why this is not a library: those
-//! that read f64 renumber vertices by first use and split them at groups, so the numbers in tags no longer mean anything
-//! (`notes/dependencies.md`). The tests compare with one of them where that does not matter.
+//! The file is read once, in blocks of a megabyte that threads parse side by side (`blocks.rs`): besides the mesh only
+//! a few of them are in memory. Why this is not a library: those that read f64 renumber vertices by first use and split
+//! them at groups, so the numbers in tags no longer mean anything (`notes/dependencies.md`). The tests compare with one
+//! of them where that does not matter.
 
 mod blocks;
 mod edits;
@@ -137,7 +137,8 @@ fn read_lines(mesh: &mut MeshBuilder, mut lines: LogicalLines<impl BufRead>, pat
 }
 
 /// Statements of the format that carry no polygon of ours.
-const PASSED_OVER: [&[u8]; 17] = [
+const PASSED_OVER: [&[u8]; 18] = [
+    b"vt",
     b"vn",
     b"o",
     b"g",
@@ -162,7 +163,6 @@ fn read_line(mesh: &mut MeshBuilder, line: &[u8]) -> Result<(), String> {
     let Some(keyword) = words.next() else { return Ok(()) };
     match keyword {
         b"v" => mesh.vertex(words),
-        b"vt" => mesh.tex_coord(words),
         b"f" => mesh.face(words),
         b"t" => tags::read_tag(mesh, words),
         comment if comment[0] == b'#' => Ok(()),

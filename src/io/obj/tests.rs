@@ -1,7 +1,7 @@
 use super::*;
 use crate::ids::{FaceId, VertexId};
 use crate::mesh::{BoundaryRule, CreaseMethod, Edit, EditKind, EditValue, TriangleRule};
-use glam::{DVec3, Vec2};
+use glam::DVec3;
 
 const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 
@@ -29,7 +29,6 @@ fn polygons_keep_file_order_across_groups() {
     let faces: Vec<Vec<u32>> = mesh.faces().map(|f| f.iter().map(|v| v.0).collect()).collect();
     assert_eq!(faces, [vec![3, 2, 1, 0], vec![0, 1, 2], vec![0, 1, 2, 3, 4]]);
     assert_eq!(mesh.positions.len(), 5);
-    assert_eq!(mesh.tex_coords, None);
 }
 
 #[test]
@@ -40,12 +39,10 @@ fn coordinates_are_the_doubles_nearest_to_the_text() {
 }
 
 #[test]
-fn texture_coordinates_stay_if_every_corner_has_one() {
-    let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt 1 0.5 0\nvt .25\nf 1/1 2/2 3/-1\n";
-    let whole = mesh(text).tex_coords.unwrap();
-    assert_eq!(whole.values, [Vec2::ZERO, Vec2::new(1.0, 0.5), Vec2::new(0.25, 0.0)]);
-    assert_eq!(whole.indices, [0, 1, 2]);
-    assert_eq!(mesh(&format!("{text}f 1/1 2 3/2\nf 1/1 2/1 3/1\n")).tex_coords, None);
+fn texture_coordinates_are_passed_over_whatever_they_name() {
+    let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvt x\nf 1/9 2/2/7 3/-1\n";
+    assert_eq!(mesh(text), mesh("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n"));
+    assert!(error("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1/a 2 3\n").contains("'a'"));
 }
 
 #[test]
@@ -123,8 +120,6 @@ fn every_mistake_gets_a_sentence_with_its_line() {
         ("v 1 2 nan\n", "m.obj:1: 'nan' is not a finite number"),
         ("v 1 2 1e999\n", "m.obj:1: '1e999' is not a finite number"),
         ("v 1 2 1e31\n", "m.obj:1: coordinate '1e31' lies beyond 1e30"),
-        ("vt\n", "m.obj:1: a texture coordinate needs u"),
-        ("vt 0 inf\n", "m.obj:1: 'inf' is not a finite number"),
         ("\nf 1 2\n", "m.obj:2: a face needs at least 3 corners and this one has 2"),
         ("f\n", "m.obj:1: a face needs at least 3 corners and this one has 0"),
         ("f 1 2 x\n", "m.obj:1: 'x' is no index"),
@@ -146,7 +141,6 @@ fn every_mistake_gets_a_sentence_with_its_line() {
 fn every_mistake_after_a_quad_gets_a_sentence_with_its_line() {
     let cases = [
         ("f 1 2 9", "vertex 9 does not exist: the file has 4, counted from 1"),
-        ("f 1/1 2/1 3/1", "texture coordinate 1 does not exist: the file has 0"),
         ("t", "a tag needs a name"),
         ("t crease", "tag 'crease' needs its ints/floats/strings counts"),
         ("t crease 2/1 0 1 2", "'2/1' should be three counts"),

@@ -59,7 +59,8 @@ pub fn cube_sphere(n: u32) -> ControlMesh {
     block(IVec3::splat(n), |p| round((2 * p - IVec3::splat(n)).as_dvec3().normalize()))
 }
 
-/// The surface of a block of `n.x * n.y * n.z` cubes: unit quads between the lattice points 0 and `n`, each put at `place`.
+/// The surface of a block of `n.x * n.y * n.z` cubes: unit quads between the lattice points 0 and `n`, each put at
+/// `place`.
 pub(super) fn block(n: IVec3, place: impl Fn(IVec3) -> DVec3) -> ControlMesh {
     let mut ids = HashMap::new();
     let mut positions = Vec::new();

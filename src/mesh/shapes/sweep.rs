@@ -42,8 +42,8 @@ pub(super) fn lathe(profile: &[(f64, f64, f32)], n: u32) -> Model {
     sweep(&sections, n)
 }
 
-/// The body through the sections. Ring k without poles before it has vertices `k * n + i`; the quads between rings k and
-/// k + 1 are faces `k * n + i`, with ring vertices i and i + 1. Caps come after the quads, poles after the rings.
+/// The body through the sections. Ring k without poles before it has vertices `k * n + i`; the quads between rings k
+/// and k + 1 are faces `k * n + i`, with ring vertices i and i + 1. Caps come after the quads, poles after the rings.
 pub(super) fn sweep(sections: &[Section], n: u32) -> Model {
     let rings: Vec<_> = sections.iter().filter(|s| !s.is_pole()).collect();
     let mut model = Model::default();
