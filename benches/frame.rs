@@ -1,5 +1,5 @@
-//! What does a frame of camera rays cost: cold, warm, with a cache of an eighth or a hundredth of what it touches, with none?
-//! And what if everything is tessellated before it?
+//! What does a frame of camera rays cost: cold, warm, with a cache of an eighth or a hundredth of what it touches, with
+//! none? And what if everything is tessellated before it?
 //!
 //! `cargo bench --bench frame`
 

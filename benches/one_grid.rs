@@ -1,5 +1,5 @@
-//! What does it cost to tessellate a patch, by the valence of its worst corner and by rate, and to build its blocks on a
-//! cache miss? `cargo bench --bench one_grid`
+//! What does it cost to tessellate a patch, by the valence of its worst corner and by rate, and to build its blocks on
+//! a cache miss? `cargo bench --bench one_grid`
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};

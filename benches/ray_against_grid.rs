@@ -1,4 +1,5 @@
-//! What does a ray cost against one piece of 8x8 cells, and what does writing the piece cost? `cargo bench --bench ray_against_grid`
+//! What does a ray cost against one piece of 8x8 cells, and what does writing the piece cost? `cargo bench --bench
+//! ray_against_grid`
 
 use bytemuck::{Pod, Zeroable};
 use divan::counter::ItemsCount;

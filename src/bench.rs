@@ -7,12 +7,14 @@
 //! diffuse     sample N at each hit, nearest hit, in tile order and once more shuffled
 //! ```
 //!
-//! A secondary ray starts `1e-4 diag` above the hit along the geometric normal and is cosine-distributed about it; its two
-//! random numbers are hashes of (pixel, 2 sample) and (pixel, 2 sample + 1). Rays and results are f32, built before any
-//! clock starts. With `batch` above 0, secondary rays are handed over in batches of so many, for the tracer to put into
-//! an order of its own: no part of the recipe. Primary rays are traced one by one as the recipe has it, but the tracer is told the bounds of a task's rays before the first, within the time that counts,
-//! as a renderer would that knows its tile; with each secondary ray it is told above which triangle that starts, as renderers know as well, unless `tells_start` is off. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of
-//! the threads (`cpu`).
+//! A secondary ray starts `1e-4 diag` above the hit along the geometric normal and is cosine-distributed about it; its
+//! two random numbers are hashes of (pixel, 2 sample) and (pixel, 2 sample + 1). Rays and results are f32, built before
+//! any clock starts. With `batch` above 0, secondary rays are handed over in batches of so many, for the tracer to put
+//! into an order of its own: no part of the recipe. Primary rays are traced one by one as the recipe has it, but the
+//! tracer is told the bounds of a task's rays before the first, within the time that counts, as a renderer would that
+//! knows its tile; with each secondary ray it is told above which triangle that starts, as renderers know as well,
+//! unless `tells_start` is off. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and
+//! per CPU second of the threads (`cpu`).
 
 use crate::io::process::thread_cpu;
 use crate::math::{DBounds, Hit, Intersect, PrimitiveRef, Ray, RayBounds};
@@ -338,7 +340,8 @@ impl Bench {
         (self.settings.batch > 0).then(|| rays.iter().map(SecondaryRay::ray).collect())
     }
 
-    /// AO and diffuse rays from the primary hits, whose triangles are asked for once more: so no pass has to write them down.
+    /// AO and diffuse rays from the primary hits, whose triangles are asked for once more: so no pass has to write them
+    /// down.
     fn secondary_rays(&self, tracer: &mut impl Intersect) -> (Vec<SecondaryRay>, Vec<SecondaryRay>) {
         let n_ao = if self.settings.passes[1] { self.settings.ao } else { 0 };
         let offset = (1e-4 * self.settings.diagonal) as f32;

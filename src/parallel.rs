@@ -33,8 +33,8 @@ pub fn for_each<T: Sync>(items: &[T], n_threads: usize, work: impl Fn(usize, &T)
     on_threads(n_threads.min(items.len()), worker);
 }
 
-/// Runs `worker` on `n_threads` threads, the caller's own among them; returns what they return. Where the system refuses
-/// a thread there are fewer: a worker takes work until there is none.
+/// Runs `worker` on `n_threads` threads, the caller's own among them; returns what they return. Where the system
+/// refuses a thread there are fewer: a worker takes work until there is none.
 pub fn on_threads<R: Send>(n_threads: usize, worker: impl Fn() -> R + Sync) -> Vec<R> {
     std::thread::scope(|scope| {
         let spawn = |_| std::thread::Builder::new().spawn_scoped(scope, &worker).ok();

@@ -1,8 +1,8 @@
 //! Many threads on few cores and a cache of a few blocks: what a slot leads to is what was built for that slot.
 //!
 //! Embree's way: every block is filled with its own id, whoever reads checks. Runs for about two seconds; for
-//! `LAZYTESS_STRESS_SECONDS` if that is set. `LAZYTESS_STRESS_THREADS=64` leaves out the lines with other numbers of threads; the lines
-//! share the time.
+//! `LAZYTESS_STRESS_SECONDS` if that is set. `LAZYTESS_STRESS_THREADS=64` leaves out the lines with other numbers of
+//! threads; the lines share the time.
 
 use lazytess::cache::{
     Block, BlockLayout, CacheConfig, CacheStatistics, Claim, Reinsert, SegmentCache, Slot, SlotId, SlotTable, Visit,

@@ -58,8 +58,8 @@ fn wrong_arguments_get_a_sentence() {
     says(&["chess-horse"], "there is no mesh 'chess-horse': choose one of ground");
     says(&["chess-pawn", "--faces", "9"], "--faces does not change a chess-pawn");
     says(&["ground", "--valence", "9"], "--valence does not change a ground");
-    says(&["pole", "--valence", "2"], "choose 3 to 1000000");
-    says(&["crowd", "--faces", "0"], "choose 1 to 500000000");
-    says(&["crowd", "--faces", "many"], "write a number such as");
+    says(&["pole", "--valence", "2"], "choose 3 to 4096");
+    says(&["crowd", "--faces", "0"], "'0' is no count");
+    says(&["crowd", "--faces", "many"], "'many' is no count");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

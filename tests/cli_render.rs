@@ -277,7 +277,7 @@ fn mistakes_are_sentences_with_exit_code_two() {
     says("cube.obj -o a.png --fov 180", "field of view");
     says("cube.obj -o a.png --size 0x8", "'0x8' is no picture size");
     says("cube.obj -o a.png --cache lots", "'lots' is no size");
-    says("cube.obj -o a.png --threads 0", "'0' is no count");
+    says("cube.obj -o a.png --threads 0", "'0' is no number of threads");
     says("cube.obj -o a.png --rate 8", "px:");
     says("cube.obj -o a.png --integrator phong", "whitted");
     says("cube.obj -o a.png --cache 1M --memory 1G", "cannot be used with");

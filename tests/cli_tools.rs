@@ -106,9 +106,9 @@ fn wrong_input_gets_a_sentence() {
     says("info none.obj", "lazytess: cannot read none.obj");
     says("info cube.stl", "is neither a scene (.toml) nor a mesh (.obj)");
     says("tessellate none.obj --rate 2 -o out.obj", "lazytess: cannot read none.obj");
-    says("tessellate cube.obj --rate 0 -o out.obj", "0 is not in 1..=4096");
-    says("tessellate cube.obj --rate 2 -o no/out.obj", "lazytess: cannot write no/out.obj");
-    says("bench cube.obj --rate 5000", "5000 is not in 1..=4096");
+    says("tessellate cube.obj --rate 0 -o out.obj", "'0' is no rate");
+    says("tessellate cube.obj --rate 2 -o no/out.obj", "no/out.obj: there is no folder no to write to");
+    says("bench cube.obj --rate 5000", "'5000' is no rate");
     says("bench cube.obj --rate 2 --rays light", "light");
     says("bench none.obj --rate 2", "lazytess: cannot read none.obj");
     says("fold cube.obj", "unrecognized subcommand 'fold'");

@@ -177,7 +177,8 @@ fn grazing_rays_hit_where_they_meet_the_surface() {
     }
 }
 
-/// A ray along an axis divides by zero in the other two, with either sign; and rays along grid lines touch many triangles.
+/// A ray along an axis divides by zero in the other two, with either sign; and rays along grid lines touch many
+/// triangles.
 #[test]
 fn axis_parallel_rays_with_zeros_of_both_signs_agree() {
     let sheet = sheet();
@@ -194,8 +195,8 @@ fn axis_parallel_rays_with_zeros_of_both_signs_agree() {
     assert!(tracer.closest(&Ray::new(DVec3::new(-5.0, 1e-6, 0.0), DVec3::X)).is_none());
 }
 
-/// A ray along an edge lies in the planes of both faces beside it: whether it touches them is free, but it must not pass the
-/// face that it meets head-on, nor lose its way among determinants that are all zero.
+/// A ray along an edge lies in the planes of both faces beside it: whether it touches them is free, but it must not
+/// pass the face that it meets head-on, nor lose its way among determinants that are all zero.
 #[test]
 fn rays_along_edges_and_grid_lines_find_what_lies_across() {
     let half = shapes::cube().bounds().max.x;

@@ -1,6 +1,8 @@
-//! Random control meshes, with and without hierarchical edits: the evaluation that dices grids against the slow reference.
+//! Random control meshes, with and without hierarchical edits: the evaluation that dices grids against the slow
+//! reference.
 //!
-//! `LAZYTESS_FUZZ=START..END cargo test --test fuzz_surface` tries other seeds. A failure is shrunk and printed as a test.
+//! `LAZYTESS_FUZZ=START..END cargo test --test fuzz_surface` tries other seeds. A failure is shrunk and printed as a
+//! test.
 
 use glam::DVec3;
 use lazytess::ids::{FaceId, PatchId};
@@ -17,8 +19,8 @@ use lazytess::subdiv::{Dicer, Evaluator, PatchRates, SampleKind, Surface, Surfac
 #[derive(Clone, Copy)]
 struct Places {
     points: &'static [[f64; 2]],
-    /// Derivatives shorter than this share of the mesh's size may err as this long ones: deep down, where they come from
-    /// differences, the reference has few digits left.
+    /// Derivatives shorter than this share of the mesh's size may err as this long ones: deep down, where they come
+    /// from differences, the reference has few digits left.
     short: f64,
 }
 
@@ -130,8 +132,8 @@ fn compare(mesh: &ControlMesh, places: Places) -> Option<String> {
     None
 }
 
-/// Vertices of a patch's grids are the surface's points, rounded to the lattice: half a step away, and a step where rounding is
-/// left to the owner of a border.
+/// Vertices of a patch's grids are the surface's points, rounded to the lattice: half a step away, and a step where
+/// rounding is left to the owner of a border.
 fn diced_differs(
     surface: &Surface,
     patch: PatchId,

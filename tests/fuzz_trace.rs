@@ -1,6 +1,7 @@
 //! Random control meshes, half of them under hierarchical edits: the lazy tracer against all triangles, one by one.
 //!
-//! `LAZYTESS_FUZZ=START..END cargo test --test fuzz_trace` tries other seeds. A failure is shrunk and printed as a test.
+//! `LAZYTESS_FUZZ=START..END cargo test --test fuzz_trace` tries other seeds. A failure is shrunk and printed as a
+//! test.
 
 mod common;
 

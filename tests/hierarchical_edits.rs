@@ -1,5 +1,5 @@
-//! The shapes of OpenSubdiv's collection that have hierarchical edits, which OpenSubdiv itself ignores: with edits against
-//! the slow reference. (Without edits, `limit_points.rs` compares them with exact points.)
+//! The shapes of OpenSubdiv's collection that have hierarchical edits, which OpenSubdiv itself ignores: with edits
+//! against the slow reference. (Without edits, `limit_points.rs` compares them with exact points.)
 
 mod common;
 

@@ -1,5 +1,5 @@
-//! Promise 3 on every closed shape: rays at borders, vertices and cells, none passes. Of the shared data's a million each, of the
-//! project's own a twentieth of that.
+//! Promise 3 on every closed shape: rays at borders, vertices and cells, none passes. Of the shared data's a million
+//! each, of the project's own a twentieth of that.
 //!
 //! The long test, 10^8 rays in all, prints the table of `notes/accuracy.md`:
 //! `LAZYTESS_LEAK_RAYS=5000000 cargo test --release --test leaks -- --nocapture`; with Embree's leaks beside, where

@@ -1,7 +1,7 @@
 //! Promise 2: the surface is the limit surface, for every tag and topology.
 //!
-//! `cargo test --test limit_points -- --nocapture` prints the tables of `notes/accuracy.md`, with Embree's errors beside where
-//! `EMBREE_PROBE` names the program `embree_probe`.
+//! `cargo test --test limit_points -- --nocapture` prints the tables of `notes/accuracy.md`, with Embree's errors
+//! beside where `EMBREE_PROBE` names the program `embree_probe`.
 
 mod common;
 
@@ -98,7 +98,8 @@ fn print_table(title: &str, results: &[(&Shape, Errors)]) {
     }
 }
 
-/// Embree's largest and 99th percentile error of positions, in diagonals, and the 99th percentile of that of normals, in radians.
+/// Embree's largest and 99th percentile error of positions, in diagonals, and the 99th percentile of that of normals,
+/// in radians.
 fn embree_errors(name: &str) -> [String; 3] {
     let folder = common::shared("meshes/opensubdiv").expect("its shapes have been read");
     let [mesh, points] = ["obj", "limit.csv"].map(|kind| folder.join(format!("{name}.{kind}")));

@@ -1,10 +1,10 @@
 //! The cache's protocol under every interleaving that loom finds: `.ci/loom.sh`.
 //!
-//! Toy sizes: blocks of one line, two segments of one or two lines. The arena has a shadow that loom watches, so a block
-//! that is read while it is written, or without the order that publication and recycling must give, fails the model
-//! even if the bytes happen to be right. Two threads are explored without bound where that ends within minutes, else with
-//! the bound of preemptions that the test names; three threads with at most two preemptions, or with one of them over before the
-//! others meet. Which weaker ordering fails which model stands in `notes/cache.md`.
+//! Toy sizes: blocks of one line, two segments of one or two lines. The arena has a shadow that loom watches, so a
+//! block that is read while it is written, or without the order that publication and recycling must give, fails the
+//! model even if the bytes happen to be right. Two threads are explored without bound where that ends within minutes,
+//! else with the bound of preemptions that the test names; three threads with at most two preemptions, or with one of
+//! them over before the others meet. Which weaker ordering fails which model stands in `notes/cache.md`.
 #![cfg(loom)]
 
 use lazytess::cache::{
@@ -45,7 +45,8 @@ impl Toy {
         })
     }
 
-    /// Spawns such a thread and waits until it is over, though nothing orders what it did before what the caller does next.
+    /// Spawns such a thread and waits until it is over, though nothing orders what it did before what the caller does
+    /// next.
     fn spawn_and_see_end(self: &Arc<Self>, visits: &'static [&'static [u32]]) -> thread::JoinHandle<()> {
         let (toy, is_over) = (self.clone(), Flag::default());
         let flag = is_over.clone();

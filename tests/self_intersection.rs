@@ -24,8 +24,8 @@ fn of_kind(name: &str, size: [u32; 2]) -> RenderSettings {
     RenderSettings { integrator, spp: 4, ao_samples: 16, ..RenderSettings::of_size(size) }
 }
 
-/// Rooms without windows whose concave creases are square, 70 degrees and, sheared, some 10 degrees sharp; turned out of
-/// the axes, so that no wall lies on lattice points.
+/// Rooms without windows whose concave creases are square, 70 degrees and, sheared, some 10 degrees sharp; turned out
+/// of the axes, so that no wall lies on lattice points.
 fn rooms() -> Vec<(&'static str, ControlMesh, DAffine3)> {
     let turned = DAffine3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 0.2));
     let flat = DAffine3::from_scale(DVec3::new(1.0, 0.15, 1.0));

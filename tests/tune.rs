@@ -25,8 +25,9 @@ fn folder_with_ground() -> tempfile::TempDir {
     folder
 }
 
-/// The share of look-ups that built nothing. In a cache of a few dozen blocks a pin can leave no place for one, which the thread
-/// then keeps for itself: that its look-ups find it there is counted apart, but the replay knows one memory only.
+/// The share of look-ups that built nothing. In a cache of a few dozen blocks a pin can leave no place for one, which
+/// the thread then keeps for itself: that its look-ups find it there is counted apart, but the replay knows one memory
+/// only.
 fn share_found(cache: &Value) -> f64 {
     let count = |key: &str| cache[key].as_f64().unwrap();
     (count("hits") + count("private_hits")) / count("lookups")

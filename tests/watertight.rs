@@ -1,7 +1,8 @@
-//! Promise 3: no ray leaks. Neighbours share their border vertices to the bit, and rays aimed at edges and vertices hit.
+//! Promise 3: no ray leaks. Neighbours share their border vertices to the bit, and rays aimed at edges and vertices
+//! hit.
 //!
-//! Here every shape, open or closed, gets `LAZYTESS_LEAK_RAYS` rays, 25,000 if nothing is said, which makes more than a million
-//! together; `tests/leaks.rs` sends many more at closed ones.
+//! Here every shape, open or closed, gets `LAZYTESS_LEAK_RAYS` rays, 25,000 if nothing is said, which makes more than a
+//! million together; `tests/leaks.rs` sends many more at closed ones.
 
 mod common;
 

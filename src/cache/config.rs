@@ -3,8 +3,8 @@
 use super::memory::{LINE, lines_for};
 use super::word::MAX_SEGMENT_LINES;
 
-/// Segments that a cache is cut into unless it is small or huge. Each costs a share of the memory that is not yet filled
-/// or about to be recycled, fewer lose more at once.
+/// Segments that a cache is cut into unless it is small or huge. Each costs a share of the memory that is not yet
+/// filled or about to be recycled, fewer lose more at once.
 const DEFAULT_SEGMENTS: usize = 64;
 /// Segments smaller than this waste too much at their end when blocks are about a kilobyte.
 const SMALLEST_DEFAULT_SEGMENT: usize = 64 << 10;
@@ -40,8 +40,8 @@ pub struct CacheConfig {
 pub enum Reinsert {
     /// None: the ring is a plain queue.
     Never,
-    /// Blocks with child slots. Where they lie among the oldest, all that was built below them is lost with them, though
-    /// it is younger.
+    /// Blocks with child slots. Where they lie among the oldest, all that was built below them is lost with them,
+    /// though it is younger.
     Parents,
     /// All.
     All,

@@ -1,14 +1,16 @@
 //! What was found out about things that have numbers, remembered for all threads as long as there is room.
 //!
-//! An entry is a **label**, which says whose the entry is and whether it is known, and some words of what is known. Another
-//! number may take the entry over at any time. Until something is known, the label counts how often it was asked for.
+//! An entry is a **label**, which says whose the entry is and whether it is known, and some words of what is known.
+//! Another number may take the entry over at any time. Until something is known, the label counts how often it was
+//! asked for.
 //!
 //! # The protocol
-//! A label is the number and one more, on top, and below it either how many questions are still to come, or [`KNOWN`] and the **edition**, which no other entry has.
-//! Who writes makes the label [`BUSY`] by compare-and-swap, so that there is one writer, writes the words, and stores the new label with `Release`. Who
-//! reads loads the label with `Acquire`, the words, and the label again. If it is the same known one, nobody has written meanwhile, since no edition
-//! comes twice (in 2^31 writes): a sequence lock (Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012) whose sequence is the
-//! label. Nobody waits: who finds an entry busy goes without.
+//! A label is the number and one more, on top, and below it either how many questions are still to come, or [`KNOWN`]
+//! and the **edition**, which no other entry has. Who writes makes the label [`BUSY`] by compare-and-swap, so that
+//! there is one writer, writes the words, and stores the new label with `Release`. Who reads loads the label with
+//! `Acquire`, the words, and the label again. If it is the same known one, nobody has written meanwhile, since no
+//! edition comes twice (in 2^31 writes): a sequence lock (Boehm, "Can seqlocks get along with programming language
+//! memory models?", MSPC 2012) whose sequence is the label. Nobody waits: who finds an entry busy goes without.
 
 use super::sync::{AtomicU64, Ordering, fence};
 
@@ -25,7 +27,8 @@ const BUSY: u64 = u64::MAX;
 pub struct MemoTable<const WORDS: usize> {
     /// A power of two of them, or none.
     entries: Box<[Entry<WORDS>]>,
-    /// A bit for each of them, set when something is known there for the first time: these lie closer together than labels.
+    /// A bit for each of them, set when something is known there for the first time: these lie closer together than
+    /// labels.
     marks: Box<[AtomicU64]>,
     n_editions: AtomicU64,
 }
@@ -105,7 +108,8 @@ impl<const WORDS: usize> MemoTable<WORDS> {
         known.was_there().then_some(words)
     }
 
-    /// Counts a question about a number that is not known. True if it has been asked for often enough: `patience()` times before.
+    /// Counts a question about a number that is not known. True if it has been asked for often enough: `patience()`
+    /// times before.
     ///
     /// The entry of another number is taken over only if `may_replace`.
     pub fn is_due(&self, number: u32, may_replace: bool, patience: impl FnOnce() -> u32) -> bool {
@@ -127,7 +131,8 @@ impl<const WORDS: usize> MemoTable<WORDS> {
         false
     }
 
-    /// Lets nobody be told for long that it is [due](Self::is_due) to find out about a number of which there is nothing to know.
+    /// Lets nobody be told for long that it is [due](Self::is_due) to find out about a number of which there is nothing
+    /// to know.
     pub fn put_off(&self, number: u32) {
         let Some(entry) = self.entry(number) else { return };
         let label = entry.label.load(Ordering::Relaxed);

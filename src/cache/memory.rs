@@ -12,7 +12,8 @@ pub(super) const fn lines_for(bytes: usize) -> usize {
     bytes.div_ceil(LINE)
 }
 
-/// Zeroed lines owned by this value and reached through raw pointers only, so that parts of it can be lent out separately.
+/// Zeroed lines owned by this value and reached through raw pointers only, so that parts of it can be lent out
+/// separately.
 pub(super) struct Memory {
     allocation: Option<(NonNull<u8>, Layout)>,
     first_line: NonNull<u8>,

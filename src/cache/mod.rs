@@ -52,8 +52,8 @@
 //! **Recycling.** Who finds the current segment full makes the next one current, if every pin stands at `head + 1 - G`
 //! or later. Any number of threads may try at once. If a pin lags behind, or if the block is larger than a segment, the
 //! block is built in memory of the thread's own and seen by no other: a **bypass**. Blocks below it are bypassed, too.
-//! A thread remembers such blocks until there are [`SegmentCache::SCRATCH_BYTES`] of them, then forgets them all: without
-//! any cache, the next ray often needs what the last one has built.
+//! A thread remembers such blocks until there are [`SegmentCache::SCRATCH_BYTES`] of them, then forgets them all:
+//! without any cache, the next ray often needs what the last one has built.
 //!
 //! A thread that the system puts to sleep in the middle of a visit pins a segment until it runs again, which with more
 //! threads than processors is soon the state of them all. So a thread that was bypassed because of a pin gives up its
@@ -72,15 +72,16 @@
 //! 3. *While a pin stands at `p`, no segment of an age above `p + G - S` is recycled.* Recycling age `a` means opening
 //!    age `a + S`, and `a + S <= p + G` by 2. It holds for what the pin's thread reads and, since it reserves at an age
 //!    of at least `p` and `G < S`, for what it writes.
-//! 4. *No announcement is missed.* A pin's thread sees the head at `p`, stores `p`, fences (`SeqCst`), and sees the head
-//!    still at `p`. A recycler opens `h + 1` only if all pins stand at `h + 1 - G` or later, its own among them, which stands at
-//!    some `c`. If `h >= p + G`, then `c > p`: the recycler saw the head at `c` before it fenced, the other thread saw it
-//!    at `p` after it fenced, so the other's fence was first, and the scan, which comes after the recycler's fence, sees the
-//!    other's pin word. If `h < p + G`, the recycler opens at most `p + G`, which the pin allows anyway. (With `G = 0`
-//!    the recycler's own pin would stop it.)
+//! 4. *No announcement is missed.* A pin's thread sees the head at `p`, stores `p`, fences (`SeqCst`), and sees the
+//!    head still at `p`. A recycler opens `h + 1` only if all pins stand at `h + 1 - G` or later, its own among them,
+//!    which stands at some `c`. If `h >= p + G`, then `c > p`: the recycler saw the head at `c` before it fenced, the
+//!    other thread saw it at `p` after it fenced, so the other's fence was first, and the scan, which comes after the
+//!    recycler's fence, sees the other's pin word. If `h < p + G`, the recycler opens at most `p + G`, which the pin
+//!    allows anyway. (With `G = 0` the recycler's own pin would stop it.)
 //! 5. *What was read is read before it is overwritten.* A pin word is stored with `Release` and scanned with `Acquire`,
-//!    the head is advanced with `Release` after the scan, and who writes in a segment has loaded the head with `Acquire`.
-//!    Every thread that may advance the head has made its own scan, so it does not matter whose advance succeeds.
+//!    the head is advanced with `Release` after the scan, and who writes in a segment has loaded the head with
+//!    `Acquire`. Every thread that may advance the head has made its own scan, so it does not matter whose advance
+//!    succeeds.
 //! 6. *A cursor belongs to one age.* It carries the age of its segment and is moved on by compare-and-swap before the
 //!    head is, so that of several recyclers one resets it. By 3 no thread adds to a cursor of an age that is past.
 //! 7. *A slot is used with its own cache only*, which is checked when it is used. A child slot lives in its parent's
@@ -93,7 +94,8 @@
 //! Idea: Benthin et al., "Efficient Ray Tracing of Subdivision Surfaces using Tessellation Caching", HPG 2015, whose
 //! cache makes all threads stop to recycle a segment; the pins are Fraser's epochs (2004) with a grace period.
 //!
-//! What is found out about things with numbers is remembered in a table beside the blocks (`memo.rs`). What other sizes would do is replayed from a **trace** of accesses (`trace.rs`, `replay.rs`).
+//! What is found out about things with numbers is remembered in a table beside the blocks (`memo.rs`). What other sizes
+//! would do is replayed from a **trace** of accesses (`trace.rs`, `replay.rs`).
 //!
 //! Read `pin.rs` first, then `segment.rs`, then `ticket.rs`.
 

@@ -142,9 +142,9 @@ impl<'c> Pin<'c> {
     }
 
     /// Forgets the blocks that this thread has built for itself, if there are too many of them or their slots may be
-    /// gone. If some of the last visit's found no place because of another pin, that pin's thread is probably asleep within
-    /// its visit, and what it needs is a processor. So this thread steps aside, and does so between two visits, with its own
-    /// pin released: then a thread that does not run holds nothing. It does not wait for anything.
+    /// gone. If some of the last visit's found no place because of another pin, that pin's thread is probably asleep
+    /// within its visit, and what it needs is a processor. So this thread steps aside, and does so between two visits,
+    /// with its own pin released: then a thread that does not run holds nothing. It does not wait for anything.
     #[cold]
     fn look_after_private_blocks(&mut self) {
         let n_tables_gone = self.cache.tag.n_tables_gone();
@@ -163,8 +163,8 @@ impl<'c> Pin<'c> {
         self.cache.tag.n_tables_gone() == self.n_tables_gone
     }
 
-    /// Announces the head's age and makes sure that the announcement was in time (invariant 4). Each further round means
-    /// that the head has moved, and once a recycler has seen the pin the head can move only a few segments more.
+    /// Announces the head's age and makes sure that the announcement was in time (invariant 4). Each further round
+    /// means that the head has moved, and once a recycler has seen the pin the head can move only a few segments more.
     #[cold]
     fn move_to_head(&mut self) {
         let ring = &self.cache.ring;
@@ -232,7 +232,8 @@ impl<'p> Visit<'p> {
         Some(if is_old { self.reinsert(word, seen) } else { unsafe { self.block(seen) } })
     }
 
-    /// The block of a slot if it is there or this thread has built it for itself, for who can do without: it does not count as looked up.
+    /// The block of a slot if it is there or this thread has built it for itself, for who can do without: it does not
+    /// count as looked up.
     ///
     /// # Panics
     /// If the slot belongs to another cache.

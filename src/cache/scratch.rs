@@ -1,5 +1,6 @@
-//! A thread's own memory, for blocks that find no place in the cache. They last at least as long as the visit that built
-//! them, and are **remembered** by the key of their slot until the memory is full: the next ray often needs the same.
+//! A thread's own memory, for blocks that find no place in the cache. They last at least as long as the visit that
+//! built them, and are **remembered** by the key of their slot until the memory is full: the next ray often needs the
+//! same.
 #![allow(unsafe_code)]
 
 use super::memory::{LINE, Memory};
@@ -53,8 +54,8 @@ impl Scratch {
             chunks.push(Chunk::of(lines.max(CHUNK_LINES)));
         }
         let first = self.used.replace(self.used.get() + lines);
-        // SAFETY: these lines lie inside the chunk and were not given out since `clear`, which needs `&mut self`, so that
-        // no slice given out before is alive. Chunks own their lines by raw pointer and may move in the vector.
+        // SAFETY: these lines lie inside the chunk and were not given out since `clear`, which needs `&mut self`, so
+        // that no slice given out before is alive. Chunks own their lines by raw pointer and may move in the vector.
         unsafe { std::slice::from_raw_parts_mut(chunks[self.current.get()].memory.line(first), lines * LINE) }
     }
 

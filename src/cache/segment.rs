@@ -133,12 +133,13 @@ impl Ring {
         if next > MAX_AGE {
             return false;
         }
-        // Invariant 4: the caller's own pin stands where it may if this passes, so that its fence is one for this scan, too.
+        // Invariant 4: the caller's own pin stands where it may if this passes, so that its fence is one for this scan,
+        // too.
         if pins.any_before(next.saturating_sub(self.grace)) {
             return false;
         }
-        // `Relaxed`: a cursor guards no memory but its own, and who sees the new head finds it reset by this thread or by one
-        // whose reset this thread has seen.
+        // `Relaxed`: a cursor guards no memory but its own, and who sees the new head finds it reset by this thread or
+        // by one whose reset this thread has seen.
         let cursor = &self.cursors[self.segment_of(next)];
         let old = cursor.load(Ordering::Relaxed);
         if old >> USED_BITS < next {
@@ -290,8 +291,8 @@ impl Arena {
     }
 }
 
-/// Under loom the same memory has a shadow that loom can see: a cell per line, so that loom reports every access that is
-/// not ordered against a write, and loom's own atomics for child words.
+/// Under loom the same memory has a shadow that loom can see: a cell per line, so that loom reports every access that
+/// is not ordered against a write, and loom's own atomics for child words.
 #[cfg(loom)]
 impl Arena {
     fn new(lines: usize) -> Option<Self> {

@@ -89,8 +89,8 @@ impl<'v> Slot<'v> {
         Self { word, tag, key: parent.as_ptr().addr() + i }
     }
 
-    /// An address that no other slot has while the table, or the parent's block, is where it is: that of a table's word,
-    /// or one in the first line of the parent.
+    /// An address that no other slot has while the table, or the parent's block, is where it is: that of a table's
+    /// word, or one in the first line of the parent.
     pub(super) fn key(self) -> usize {
         self.key
     }

@@ -12,7 +12,8 @@ const TIMED_BUILDS: u64 = 13;
 
 /// Counters summed over all pins that were dropped.
 ///
-/// `lookups = hits + private_hits + misses()`, and every miss is one of compulsory, capacity, concurrent and bypassed-parent.
+/// `lookups = hits + private_hits + misses()`, and every miss is one of compulsory, capacity, concurrent and
+/// bypassed-parent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
 #[non_exhaustive]
 pub struct CacheStatistics {

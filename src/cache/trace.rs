@@ -1,4 +1,5 @@
-//! Which blocks were asked for, in which order: what a cache of another size or kind would have done is replayed from it.
+//! Which blocks were asked for, in which order: what a cache of another size or kind would have done is replayed from
+//! it.
 //!
 //! A **trace** is a list of accesses; an access names a block by a hash and tells its size. Blocks below other blocks
 //! follow these, so that the list also tells who is whose parent. Where the list would become too long, only a
@@ -109,8 +110,9 @@ impl TraceLog {
         self.first_left_out.load(Ordering::Relaxed)
     }
 
-    /// Adds accesses that begin with one to a root. Where they become too many, the sample is halved for as long as it has roots
-    /// enough, then nothing more is recorded: the beginning of a render stands for all of it better than a root or two for all roots.
+    /// Adds accesses that begin with one to a root. Where they become too many, the sample is halved for as long as it
+    /// has roots enough, then nothing more is recorded: the beginning of a render stands for all of it better than a
+    /// root or two for all roots.
     fn add(&self, batch: &mut Vec<Access>) {
         let mut accesses = self.accesses.lock();
         if self.is_full.load(Ordering::Relaxed) {

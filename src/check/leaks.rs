@@ -8,8 +8,8 @@ use crate::mesh::shapes::noise::Random;
 use crate::parallel::on_threads;
 use crate::scene::world::WorldMesh;
 use glam::{DAffine3, DVec3};
+use parking_lot::Mutex;
 use serde::Serialize;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// How to test.
@@ -94,12 +94,12 @@ pub fn find_leaks<T: Intersect>(
             }
             let n_rays = TASK_RAYS.min(settings.rays - task * TASK_RAYS);
             worker.run(&mut Random::new(settings.seed, task), n_rays);
-            total.lock().expect("no thread panicked").push((task, std::mem::take(&mut worker.report)));
+            total.lock().push((task, std::mem::take(&mut worker.report)));
             progress(done.fetch_add(n_rays, Ordering::Relaxed) + n_rays);
         }
     };
     on_threads(settings.threads, work);
-    let mut reports = total.into_inner().expect("no thread panicked");
+    let mut reports = total.into_inner();
     reports.sort_by_key(|(task, _)| *task);
     reports.into_iter().fold(LeakReport::default(), |sum, (_, report)| sum.with(report))
 }

@@ -3,8 +3,8 @@
 //! A **seam** is a line that two patches share: an edge of the control mesh, or the line from the middle of a polygon's
 //! edge to its centre. Both patches dice it for themselves; [`compare_seams`] asks for equal bits.
 //!
-//! The ray test ([`find_leaks`]) aims at a **target**: a grid vertex, or a point of the line between two triangles, on a
-//! seam, at a vertex of the control mesh, or inside a patch. It collects the triangles around the target from all
+//! The ray test ([`find_leaks`]) aims at a **target**: a grid vertex, or a point of the line between two triangles, on
+//! a seam, at a vertex of the control mesh, or inside a patch. It collects the triangles around the target from all
 //! patches that meet there, and their **outline**: what is left of their edges when shared ones cancel. Seen along the
 //! ray, an outline that winds around the target leaves no way past the triangles:
 //!

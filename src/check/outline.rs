@@ -71,7 +71,8 @@ pub(super) fn point(v: Vertex) -> DVec3 {
 }
 
 impl Outline {
-    /// Whether the outline, seen along the unit vector `direction`, winds around `point` and keeps `margin` away from it.
+    /// Whether the outline, seen along the unit vector `direction`, winds around `point` and keeps `margin` away from
+    /// it.
     pub fn encloses(&self, point: DVec3, direction: DVec3, margin: f64) -> bool {
         let (right, up) = direction.any_orthonormal_pair();
         let seen = |p: DVec3| DVec2::new((p - point).dot(right), (p - point).dot(up));

@@ -7,8 +7,8 @@ use crate::parallel::on_threads;
 use crate::scene::world::WorldMesh;
 use crate::subdiv::Dicer;
 use crate::subdiv::dice::snapped;
+use parking_lot::Mutex;
 use serde::Serialize;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// What a comparison found.
@@ -52,10 +52,10 @@ pub fn compare_seams(mesh: &WorldMesh, incidence: &Incidence, n_threads: usize, 
                 }
             }
         }
-        total.lock().expect("no thread panicked").add(comparer.report);
+        total.lock().add(comparer.report);
     };
     on_threads(n_threads, work);
-    let mut report = total.into_inner().expect("no thread panicked");
+    let mut report = total.into_inner();
     report.examples.sort();
     report.examples.truncate(MAX_EXAMPLES);
     report

@@ -53,7 +53,8 @@ pub struct BenchArgs {
     /// Hand secondary rays over N at a time, for the tracer to put into an order of its own; 0: one by one, as given
     #[arg(long, default_value_t = 0, value_name = "N")]
     batch: usize,
-    /// Do not tell on which triangle secondary rays start, so that they are tested against all of the patch that they leave
+    /// Do not tell on which triangle secondary rays start, so that they are tested against all of the patch that they
+    /// leave
     #[arg(long)]
     no_start: bool,
     /// Passes of each measurement

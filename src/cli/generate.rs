@@ -19,8 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 ///
 /// Meshes of any size, made without holding them in memory: ground (mountains, quads only), scan (an irregular closed
 /// mesh of quads and triangles), crowd (puppets, no two alike). Meshes with one vertex or face of any valence: pole,
-/// quad-pole, globe, prism, n-gon. And by name every mesh of scenes/meshes (such as chess-knight) and every shape of the
-/// test corpus; a name that does not exist lists them all. The same arguments give the same file on every machine.
+/// quad-pole, globe, prism, n-gon. And by name every mesh of scenes/meshes (such as chess-knight) and every shape of
+/// the test corpus; a name that does not exist lists them all. The same arguments give the same file on every machine.
 #[derive(Args, Debug)]
 pub struct GenerateArgs {
     /// What to make

@@ -39,8 +39,8 @@ pub const SPEED: &str = "How it is computed (these never change it)";
 
 /// Ray traces Catmull-Clark subdivision surfaces, tessellating only what rays touch.
 ///
-/// A mesh is an OBJ file of polygons, with subdivision tags (creases, corners, holes) in `t` lines if wanted. A scene is
-/// a TOML file that names meshes, materials, lights and a camera. Sizes read like 64M or 2G (binary).
+/// A mesh is an OBJ file of polygons, with subdivision tags (creases, corners, holes) in `t` lines if wanted. A scene
+/// is a TOML file that names meshes, materials, lights and a camera. Sizes read like 64M or 2G (binary).
 #[derive(Parser, Debug)]
 #[command(name = "lazytess", version, max_term_width = 110, arg_required_else_help = true)]
 pub struct Cli {

@@ -40,7 +40,8 @@ pub struct PictureArgs {
     /// Trace only the pixels that need it (adaptive), every pixel (off), or corners of patches (thesis, unchecked)
     #[arg(long, value_name = "adaptive|off|thesis", default_value_t = Groups::Adaptive, help_heading = PICTURE)]
     pub groups: Groups,
-    /// Error that --groups adaptive may make, in display units (0 to 1 after sRGB); reads like 0.02 or 5/255; 0: trace all
+    /// Error that --groups adaptive aims at, in display units (0 to 1 after sRGB): at most 1 % of pixels are further
+    /// off; reads like 0.02 or 5/255; 0: trace all
     #[arg(long, value_name = "E", default_value = "1/255", value_parser = display_units, help_heading = PICTURE)]
     pub tolerance: f32,
     /// The camera

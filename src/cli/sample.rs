@@ -13,9 +13,9 @@ use std::path::PathBuf;
 
 /// Print positions and tangents of the limit surface as CSV
 ///
-/// Places are rows of face,sub,u,v: the face in file order from 0, the quad within it (0 for a quad, the corner's number
-/// for another polygon) and the parameters there. Tangents are derivatives with respect to u and v, unit vectors at
-/// smooth extraordinary vertices, and zero where there are none. Evaluated with the code that dices grids.
+/// Places are rows of face,sub,u,v: the face in file order from 0, the quad within it (0 for a quad, the corner's
+/// number for another polygon) and the parameters there. Tangents are derivatives with respect to u and v, unit vectors
+/// at smooth extraordinary vertices, and zero where there are none. Evaluated with the code that dices grids.
 #[derive(Args, Clone, Debug)]
 pub struct SampleArgs {
     /// mesh.obj

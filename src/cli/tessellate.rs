@@ -19,8 +19,9 @@ use std::sync::atomic::Ordering;
 /// Write the tessellation as an OBJ of triangles
 ///
 /// All vertices lie on the limit surface and neighbouring patches share them: the result is as closed as the control
-/// mesh. The triangles of each control face are a group `face_N`, N in file order from 0. All triangles and a number for each
-/// vertex are in memory until the file is written, some 60 bytes a triangle: the other commands need no such thing.
+/// mesh. The triangles of each control face are a group `face_N`, N in file order from 0. All triangles and a number
+/// for each vertex are in memory until the file is written, some 60 bytes a triangle: the other commands need no such
+/// thing.
 #[derive(Args, Clone, Debug)]
 pub struct TessellateArgs {
     /// mesh.obj

@@ -1,7 +1,7 @@
 //! `lazytess tradeoff --thesis`: tables 5.1 to 5.3 of the thesis, in two readings.
 //!
-//! As published, a group shows one facet of the mesh subdivided `d` times, so groups shrink with depth until every pixel is
-//! a corner. Here a group belongs to the patch of a base face, whatever it is diced into.
+//! As published, a group shows one facet of the mesh subdivided `d` times, so groups shrink with depth until every
+//! pixel is a corner. Here a group belongs to the patch of a base face, whatever it is diced into.
 
 use super::input::settle_rates;
 use super::job::{Prepared, RenderScene};

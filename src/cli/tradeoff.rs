@@ -40,7 +40,8 @@ pub struct TradeoffArgs {
     #[arg(long, value_delimiter = ',', value_name = "LIST", help_heading = PICTURE)]
     pub rates: Vec<Rate>,
     /// Which ways of grouping to try
-    #[arg(long, value_delimiter = ',', default_value = "off,thesis,adaptive", value_name = "LIST", help_heading = PICTURE)]
+    #[arg(long, value_delimiter = ',', default_value = "off,thesis,adaptive", value_name = "LIST",
+          help_heading = PICTURE)]
     pub groups: Vec<Groups>,
     /// Width and height in pixels [default: the scene's, or 800x600]
     #[arg(long, value_name = "WxH", value_parser = picture_size, help_heading = PICTURE)]

@@ -1,4 +1,5 @@
-//! The head that pieces and nodes share: sixteen 8-bit boxes relative to one corner, and the test of a ray against them.
+//! The head that pieces and nodes share: sixteen 8-bit boxes relative to one corner, and the test of a ray against
+//! them.
 
 use super::{LatticeRay, Plane};
 use crate::math::simd::Kernel;
@@ -30,7 +31,8 @@ impl CellRect {
 
 /// Boxes of up to 4x4 things. Thing (a, b) is **lane** 4 b + a.
 ///
-/// Plane q of axis k is at `base[k] + q * 2^exponent[k]`: an integer, so a box is exact but for being rounded outwards to whole steps.
+/// Plane q of axis k is at `base[k] + q * 2^exponent[k]`: an integer, so a box is exact but for being rounded outwards
+/// to whole steps.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Head {
@@ -99,8 +101,9 @@ fn step_exponent(extent: u32) -> u32 {
 }
 
 impl Head {
-    /// Makes a head whose lane k, for every bit k of `lane_mask(lanes)`, has the box k of `boxes`; the others are not looked at.
-    /// `whole` is the box around them all, with coordinates up to 2^24. Each field is written where it stays.
+    /// Makes a head whose lane k, for every bit k of `lane_mask(lanes)`, has the box k of `boxes`; the others are not
+    /// looked at. `whole` is the box around them all, with coordinates up to 2^24. Each field is written where it
+    /// stays.
     #[inline(always)]
     pub fn set(
         &mut self,
@@ -131,8 +134,8 @@ impl Head {
         u32::from(self.mask) == lane_mask(self.lanes)
     }
 
-    /// Makes the lane's box one that no ray meets: along the ray's longest axis it is left 255 planes before it is entered,
-    /// and the test's slack is 60 at most on either side.
+    /// Makes the lane's box one that no ray meets: along the ray's longest axis it is left 255 planes before it is
+    /// entered, and the test's slack is 60 at most on either side.
     pub fn turn_inside_out(&mut self, lane: usize) {
         for k in 0..3 {
             (self.planes[k][lane], self.planes[k + 3][lane]) = (255, 0);
@@ -196,8 +199,8 @@ impl Head {
     }
 }
 
-/// What a ray makes of a head: t of plane q of axis k is `q * step[k] + near[k]` (or `far`), see [`LatticeRay`]. Each for
-/// x, y, z and one to spare, twice.
+/// What a ray makes of a head: t of plane q of axis k is `q * step[k] + near[k]` (or `far`), see [`LatticeRay`]. Each
+/// for x, y, z and one to spare, twice.
 struct Slabs<K: Kernel> {
     step: K::F,
     near: K::F,

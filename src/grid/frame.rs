@@ -10,8 +10,8 @@ pub(super) const PARTS: usize = 4;
 /// Length of the longest component of a packed vector.
 pub(super) const PACKED: f32 = 63.0;
 
-/// By how much a direction of length 1 or so has to be higher than what it is to clear, where it does not lead as far along the surface as it is high: errors of scalar products with
-/// components of some 2^13 at most.
+/// By how much a direction of length 1 or so has to be higher than what it is to clear, where it does not lead as far
+/// along the surface as it is high: errors of scalar products with components of some 2^13 at most.
 pub(super) const MARGIN_IN_HEIGHT: f32 = 0.25;
 
 /// This is added to components of packed vectors, so that none is negative.
@@ -25,7 +25,8 @@ const IS_TURNED: u8 = 0x80;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Pod, Zeroable)]
 #[repr(transparent)]
 pub(super) struct PackedFrame {
-    /// For u and v: m_u or m_v, and 64 times the parts in a cell. The highest bit of the first of those is set if n is turned.
+    /// For u and v: m_u or m_v, and 64 times the parts in a cell. The highest bit of the first of those is set if n is
+    /// turned.
     axes: [[u8; 4]; 2],
 }
 
@@ -98,7 +99,8 @@ pub(super) fn part(cell: u32, parts_per_cell: u8) -> u32 {
     cell * u32::from(parts_per_cell) / 64 % PARTS as u32
 }
 
-/// m_u and m_v for a patch that leads along `of_u` and `of_v` on the whole, each at a right angle to the other's edges; `None` if it leads nowhere.
+/// m_u and m_v for a patch that leads along `of_u` and `of_v` on the whole, each at a right angle to the other's edges;
+/// `None` if it leads nowhere.
 pub(super) fn axes(of_u: Vec3, of_v: Vec3) -> Option<[Vec3; 2]> {
     let (of_u, of_v) = (of_u.try_normalize()?, of_v.try_normalize()?);
     let normal = of_u.cross(of_v).try_normalize()?;

@@ -46,7 +46,8 @@ impl TriangleId {
 /// The nearest hit so far of a ray in lattice space.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LatticeHit {
-    /// Ray parameter in units of the ray's own, scaled direction (see [`LatticeRay::caller_t`](super::LatticeRay::caller_t)).
+    /// Ray parameter in units of the ray's own, scaled direction (see
+    /// [`LatticeRay::caller_t`](super::LatticeRay::caller_t)).
     pub t: f32,
     /// The triangle; [`TriangleId::NONE`] until something is hit.
     pub triangle: TriangleId,
@@ -56,8 +57,8 @@ pub struct LatticeHit {
     pub grid: [u16; 2],
     /// The triangle's corners: lattice points, which f32 holds exactly.
     pub corners: [Vec3; 3],
-    /// Cross product of the triangle's edges, in lattice units squared, along du x dv: exact, zero for one without area. Kept with
-    /// the corners, since reading them back at once would wait for their stores.
+    /// Cross product of the triangle's edges, in lattice units squared, along du x dv: exact, zero for one without
+    /// area. Kept with the corners, since reading them back at once would wait for their stores.
     pub normal: DVec3,
 }
 
@@ -81,10 +82,11 @@ impl LatticeHit {
         self.triangle != TriangleId::NONE
     }
 
-    /// Cross product of a triangle's edges. Zero for a triangle without area, which can still be hit: it fills the crack
-    /// between its neighbours.
+    /// Cross product of a triangle's edges. Zero for a triangle without area, which can still be hit: it fills the
+    /// crack between its neighbours.
     ///
-    /// Exact, slivers included: edges are whole numbers below 2^25, products below 2^50, and f64 holds their differences.
+    /// Exact, slivers included: edges are whole numbers below 2^25, products below 2^50, and f64 holds their
+    /// differences.
     #[inline(always)]
     pub(super) fn normal_of(corners: [IVec3; 3]) -> DVec3 {
         let [a, b, c] = corners;

@@ -1,9 +1,11 @@
 //! Tessellated patches as blocks of bytes, and rays against them.
 //!
-//! A **grid** is a patch cut into n_u x n_v **cells**, two triangles each; its vertices are points of the mesh's integer
-//! **lattice**. A grid is stored as **pieces** of at most 8x8 cells, so that a ray pays for the corner it touches. A piece is one
-//! block of bytes: a head, sixteen boxes around **blocks** of 2x2 cells, and the vertices as offsets from the piece's lowest corner.
-//! The pieces of a larger patch hang from a tree of **nodes**, blocks with boxes around up to 4x4 children.
+//! A **grid** is a patch cut into n_u x n_v **cells**, two triangles each; its vertices are points of the mesh's
+//! integer
+//! **lattice**. A grid is stored as **pieces** of at most 8x8 cells, so that a ray pays for the corner it touches. A
+//! piece is one block of bytes: a head, sixteen boxes around **blocks** of 2x2 cells, and the vertices as offsets from
+//! the piece's lowest corner. The pieces of a larger patch hang from a tree of **nodes**, blocks with boxes around up
+//! to 4x4 children.
 //!
 //! ```text
 //!   piece                                             block: 2x2 cells = 8 triangles = one SIMD test
@@ -17,15 +19,18 @@
 //! ```
 //!
 //! # Invariants
-//! 1. A vertex is an integer point with |coordinate| <= 2^24, so it is exact in f32, and every piece that holds it decodes the same bits.
-//! 2. Triangles are watertight (Woop, Benthin, Wald 2013): the test's result depends on the signs of edge functions that are exact
-//!    for vertices moved by a function of the vertex and the ray alone, so two triangles never disagree about a shared edge.
-//! 3. Boxes are conservative against that very test: a triangle that would be hit is never hidden by its box ([`LatticeRay`] has the argument).
+//! 1. A vertex is an integer point with |coordinate| <= 2^24, so it is exact in f32, and every piece that holds it
+//!    decodes the same bits.
+//! 2. Triangles are watertight (Woop, Benthin, Wald 2013): the test's result depends on the signs of edge functions
+//!    that are exact for vertices moved by a function of the vertex and the ray alone, so two triangles never disagree
+//!    about a shared edge.
+//! 3. Boxes are conservative against that very test: a triangle that would be hit is never hidden by its box
+//!    ([`LatticeRay`] has the argument).
 //! 4. Every kernel gives the same bits.
 //! 5. Of two hits at equal t the smaller [`TriangleId`] wins, so the order of tests does not matter.
 //!
-//! Read [`ray`](LatticeRay), then `boxes.rs`, `piece.rs`, `triangles.rs`; `horizon/` spares rays the surface that they leave,
-//! `skyline/` all the rest.
+//! Read [`ray`](LatticeRay), then `boxes.rs`, `piece.rs`, `triangles.rs`; `horizon/` spares rays the surface that they
+//! leave, `skyline/` all the rest.
 
 mod boxes;
 mod frame;

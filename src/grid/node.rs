@@ -12,9 +12,9 @@ pub const NODE_BYTES: usize = HEAD_BYTES;
 /// In place of a vertex format: a node has no vertices.
 const NO_FORMAT: u8 = 0;
 
-/// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `bounds` has one box in lattice units
-/// for each, u fastest; it must hold every lattice vertex of the child. A child with an empty box is never met; one at least is not
-/// empty. `out` is [`NODE_BYTES`] long.
+/// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `bounds` has one
+/// box in lattice units for each, u fastest; it must hold every lattice vertex of the child. A child with an empty box
+/// is never met; one at least is not empty. `out` is [`NODE_BYTES`] long.
 #[inline]
 pub fn encode_node(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &mut [u8]) {
     simd::run(EncodeNode { cells, children, bounds, out });

@@ -77,8 +77,8 @@ const fn used_bytes(lanes: [u8; 2], format: usize) -> usize {
 }
 
 impl PieceLayout {
-    /// The layout of the piece over `cells` (1 to 8 along u and v) with these vertices, every |coordinate| at most 2^24, of a
-    /// patch of `grid` cells along u and v.
+    /// The layout of the piece over `cells` (1 to 8 along u and v) with these vertices, every |coordinate| at most
+    /// 2^24, of a patch of `grid` cells along u and v.
     #[inline]
     pub fn new(vertices: &LatticeGrid, cells: CellRect, grid: [u16; 2]) -> Self {
         let [n_u, n_v] = cells.size();
@@ -93,7 +93,8 @@ impl PieceLayout {
         layout
     }
 
-    /// Exact size of the block, a multiple of 64: 640 at 8x8 cells and 16 bits (5 bytes a triangle), 896 at 24 bits (7).
+    /// Exact size of the block, a multiple of 64: 640 at 8x8 cells and 16 bits (5 bytes a triangle), 896 at 24 bits
+    /// (7).
     #[inline]
     pub fn bytes(&self) -> usize {
         block_bytes(lanes(self.cells), self.format as usize)
@@ -104,7 +105,8 @@ impl PieceLayout {
         self.format
     }
 
-    /// Writes the block. `vertices` are those of [`Self::new`]; `out` is [`Self::bytes`] long and aligned to 4 bytes at least.
+    /// Writes the block. `vertices` are those of [`Self::new`]; `out` is [`Self::bytes`] long and aligned to 4 bytes at
+    /// least.
     #[inline]
     pub fn encode(&self, vertices: &LatticeGrid, out: &mut [u8]) {
         assert_eq!(out.len(), self.bytes(), "room for a piece");

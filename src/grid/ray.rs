@@ -57,7 +57,8 @@ pub(crate) enum Axis {
     Z,
 }
 
-/// What follows from the signs of a direction's components and from their order by magnitude. (Aligned, so that it is copied at once.)
+/// What follows from the signs of a direction's components and from their order by magnitude. (Aligned, so that it is
+/// copied at once.)
 #[derive(Clone, Copy, Debug)]
 #[repr(align(16))]
 pub(crate) struct Sides {
@@ -65,13 +66,14 @@ pub(crate) struct Sides {
     pub near: [Plane; 3],
     /// The planes where it leaves.
     pub far: [Plane; 3],
-    /// Axes (x, y, z of the sheared space): z is that of the largest component; x and y are swapped if that is negative, which keeps the winding.
+    /// Axes (x, y, z of the sheared space): z is that of the largest component; x and y are swapped if that is
+    /// negative, which keeps the winding.
     pub axes: [Axis; 3],
 }
 
 impl Sides {
-    /// By signs, times eight, and order. Bit k of the signs is set where the direction is negative along axis k; bits of
-    /// the order by magnitude are x >= y, x >= z and y >= z.
+    /// By signs, times eight, and order. Bit k of the signs is set where the direction is negative along axis k; bits
+    /// of the order by magnitude are x >= y, x >= z and y >= z.
     const TABLE: [Self; 64] = {
         let mut table = [Self::of(0, 0); 64];
         let mut i = 0;
@@ -116,32 +118,36 @@ pub(crate) type Twice = [f32; 8];
 
 /// A ray in lattice space.
 ///
-/// The direction is scaled by a power of two, so that its largest component is in [1, 2]: `t` inside lattice space counts in units of
-/// the scaled direction, and [`Self::caller_t`] gives it in the caller's. Components below 2^-64 of the largest count as zero.
+/// The direction is scaled by a power of two, so that its largest component is in [1, 2]: `t` inside lattice space
+/// counts in units of the scaled direction, and [`Self::caller_t`] gives it in the caller's. Components below 2^-64 of
+/// the largest count as zero.
 /// *The ray* below is the one with the rounded direction, from `cell + fraction`.
 ///
 /// # Why no box hides a triangle that would be hit
-/// Write u = 2^-24 and D for the largest distance, along any axis, from the origin to a point of the lattice cube; |origin| <= 2^25, and
-/// `reach` = |origin| + 2^24 >= D.
+/// Write u = 2^-24 and D for the largest distance, along any axis, from the origin to a point of the lattice cube;
+/// |origin| <= 2^25, and `reach` = |origin| + 2^24 >= D.
 ///
-/// *Triangles.* Corners are taken relative to `cell` as integers, without error, so that distances from the origin keep their relative precision:
-/// (v - o) is fl(fl(v - cell) - fraction), off by 2 u |v - o| at most. A vertex v is sheared to
-/// v'_x = fl((v - o)_x - fl(S_x (v - o)_z)), |S_x| <= 1 (z stands for the axis of the largest component). Summing the roundings,
-/// |v'_x - exact| <= u (3 |v_x - o_x| + 5 |v_z - o_z|) <= 8 u D. The signs of the edge functions are exact for these v'.
-/// If they report a hit, some point P of the exact triangle has, at its own depth, a distance of at most 8 u D along x and y from the ray.
-/// So the ray passes through every box around the triangle that is widened by 8 u D. (Nearer triangles err less: one that lies within L of the
-/// origin, by 8 u L.)
+/// *Triangles.* Corners are taken relative to `cell` as integers, without error, so that distances from the origin keep
+/// their relative precision: (v - o) is fl(fl(v - cell) - fraction), off by 2 u |v - o| at most. A vertex v is sheared
+/// to v'_x = fl((v - o)_x - fl(S_x (v - o)_z)), |S_x| <= 1 (z stands for the axis of the largest component). Summing
+/// the roundings, |v'_x - exact| <= u (3 |v_x - o_x| + 5 |v_z - o_z|) <= 8 u D. The signs of the edge functions are
+/// exact for these v'. If they report a hit, some point P of the exact triangle has, at its own depth, a distance of at
+/// most 8 u D along x and y from the ray. So the ray passes through every box around the triangle that is widened by 8
+/// u D. (Nearer triangles err less: one that lies within L of the origin, by 8 u L.)
 ///
-/// *Boxes.* A plane is tested as fl(plane * inv - fl(o * inv)), or for 8-bit boxes as fl(q * step_inv + fl(fl(base - o) * inv)) with an exact
-/// `step_inv` but for the rounding of `inv` itself, and o rounded to f32, by u |o|; the product may or may not be rounded before the sum. The errors, as
-/// distances along the axis, are at most u |plane| + u |o| + 2 u D in the first case, and |plane| + |o| <= `reach`; in the second at most
-/// 2 u q step + 3 u |base - o| + u |sum| <= 8 u D, for no box is wider than 2 D. Both are at most 8 u `reach`.
+/// *Boxes.* A plane is tested as fl(plane * inv - fl(o * inv)), or for 8-bit boxes as
+/// fl(q * step_inv + fl(fl(base - o) * inv)) with an exact `step_inv` but for the rounding of `inv` itself, and o
+/// rounded to f32, by u |o|; the product may or may not be rounded before the sum. The errors, as distances along the
+/// axis, are at most u |plane| + u |o| + 2 u D in the first case, and |plane| + |o| <= `reach`; in the second at most 2
+/// u q step + 3 u |base - o| + u |sum| <= 8 u D, for no box is wider than 2 D. Both are at most 8 u `reach`.
 ///
-/// All are covered by moving the near planes towards the origin and the far planes away from it by `slack` = 20 u `reach`; this
-/// is done once per ray, in `near_origin` and `far_origin`, whose rounding takes 2 u `reach` of it at most: 18 u `reach` >= 17 u `reach`. In a coordinate system of 2^24 steps, slack is 60 steps at most.
+/// All are covered by moving the near planes towards the origin and the far planes away from it by `slack` = 20 u
+/// `reach`; this is done once per ray, in `near_origin` and `far_origin`, whose rounding takes 2 u `reach` of it at
+/// most: 18 u `reach` >= 17 u `reach`. In a coordinate system of 2^24 steps, slack is 60 steps at most.
 ///
-/// *Zero components* have `inv` = +-2^96, by sign. Where the origin is inside a widened slab, the distance to its planes is at least 2 u `reach`, times 2^96: beyond
-/// any t; where it is outside, the entry is beyond any t likewise. No operation on finite boxes gives infinity or NaN.
+/// *Zero components* have `inv` = +-2^96, by sign. Where the origin is inside a widened slab, the distance to its
+/// planes is at least 2 u `reach`, times 2^96: beyond any t; where it is outside, the entry is beyond any t likewise.
+/// No operation on finite boxes gives infinity or NaN.
 #[derive(Clone, Copy, Debug)]
 pub struct LatticeRay {
     /// Origin moved along the direction's sign by the slack: near planes are measured from it.
@@ -166,10 +172,11 @@ pub struct LatticeRay {
 }
 
 impl LatticeRay {
-    /// The ray from `origin` along `direction`, both in lattice space; `t_max` in units of `direction`. The triangle `skip` is not hit
-    /// ([`TriangleId::NONE`]: every triangle can be).
+    /// The ray from `origin` along `direction`, both in lattice space; `t_max` in units of `direction`. The triangle
+    /// `skip` is not hit ([`TriangleId::NONE`]: every triangle can be).
     ///
-    /// The direction may have any length. If it is zero, or anything is not finite (but for `t_max`), the ray hits nothing.
+    /// The direction may have any length. If it is zero, or anything is not finite (but for `t_max`), the ray hits
+    /// nothing.
     pub fn new(origin: DVec3, direction: DVec3, t_max: f32, skip: TriangleId) -> Self {
         let four = |v: DVec3| [v.x, v.y, v.z, 0.0];
         Self::of_lanes(Portable, four(origin), four(direction), t_max, skip)
@@ -232,7 +239,8 @@ impl LatticeRay {
         DVec3::from_array(std::array::from_fn(|k| f64::from(self.cell[k]) + f64::from(self.fraction[k])))
     }
 
-    /// A ray parameter of lattice space in units of the direction that [`Self::new`] was given. Monotone, finite for finite `t`.
+    /// A ray parameter of lattice space in units of the direction that [`Self::new`] was given. Monotone, finite for
+    /// finite `t`.
     #[inline]
     pub fn caller_t(&self, t: f32) -> f32 {
         let t = (f64::from(t) + self.t_start) * self.t_unit;
@@ -245,7 +253,8 @@ impl LatticeRay {
         (inner + inner.abs() * 1e-6 + self.t_start.abs() * 1e-12) as f32
     }
 
-    /// True for one of so many rays, a power of two, without further meaning: of those from one point as of those along one direction.
+    /// True for one of so many rays, a power of two, without further meaning: of those from one point as of those along
+    /// one direction.
     #[inline(always)]
     pub fn is_one_in(&self, n: u32) -> bool {
         let [x, y, z, ..] = self.cell;

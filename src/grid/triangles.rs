@@ -1,4 +1,5 @@
-//! Rays against the triangles of a piece: eight at a time, watertight (Woop, Benthin, Wald: "Watertight Ray/Triangle Intersection", 2013).
+//! Rays against the triangles of a piece: eight at a time, watertight (Woop, Benthin, Wald: "Watertight Ray/Triangle
+//! Intersection", 2013).
 #![allow(unsafe_code)]
 
 use super::boxes::HEAD_BYTES;
@@ -9,8 +10,8 @@ use crate::math::simd::Kernel;
 use glam::IVec3;
 
 impl PieceView<'_> {
-    /// Takes the nearest hit of the piece into `hit` if it is nearer than what is there, or as near and the smaller triangle.
-    /// Says whether it did.
+    /// Takes the nearest hit of the piece into `hit` if it is nearer than what is there, or as near and the smaller
+    /// triangle. Says whether it did.
     #[inline(always)]
     pub fn closest<K: Kernel>(&self, kernel: K, ray: &LatticeRay, patch: PatchId, hit: &mut LatticeHit) -> bool {
         let before = hit.triangle;
@@ -36,8 +37,9 @@ impl PieceView<'_> {
         is_nearer
     }
 
-    /// Asks for the vertices while the boxes are tested: a piece is visited once or twice by a ray and then left, so that
-    /// its lines are seldom near. Measured on trex at rate 16: diffuse rays 1.2 times as fast, shuffled ones 1.27 times.
+    /// Asks for the vertices while the boxes are tested: a piece is visited once or twice by a ray and then left, so
+    /// that its lines are seldom near. Measured on trex at rate 16: diffuse rays 1.2 times as fast, shuffled ones 1.27
+    /// times.
     #[inline(always)]
     fn prefetch<K: Kernel>(&self, kernel: K) {
         /// Lines of a piece of 8 x 8 cells at 16 bits.
@@ -135,7 +137,8 @@ impl Found {
     }
 }
 
-/// One coordinate of the nine vertices of a block, relative to the ray's origin. Four lanes are vertices 0 to 2 of a row and one more.
+/// One coordinate of the nine vertices of a block, relative to the ray's origin. Four lanes are vertices 0 to 2 of a
+/// row and one more.
 struct Rows<K: Kernel> {
     /// Rows 0 and 1.
     low: K::F,
@@ -143,7 +146,8 @@ struct Rows<K: Kernel> {
     high: K::F,
 }
 
-// No closures over lanes here: code that is not `#[inline(always)]` is compiled without the kernel's instructions, twenty times slower.
+// No closures over lanes here: code that is not `#[inline(always)]` is compiled without the kernel's instructions,
+// twenty times slower.
 impl<K: Kernel> Rows<K> {
     #[inline(always)]
     fn load<const BYTES: usize>(piece: &PieceView, k: K, ray: &LatticeRay, block: usize, axis: Axis) -> Self {
@@ -153,9 +157,11 @@ impl<K: Kernel> Rows<K> {
         let at = HEAD_BYTES + next * row + row_bytes * axis + BYTES * column;
         // Relative to the ray's own lattice point: exact, whatever the distance from the lattice's centre.
         let (base, origin) = (piece.head.base[axis] - ray.cell[axis], k.splat(ray.fraction[axis]));
-        // SAFETY: `PieceView::new` checked that the bytes hold every vertex of the lanes in the head and the tail after them, and that a test finds
-        // none but those lanes; `BYTES` is their format. `block` comes from such a test, so each place is at least three coordinates before the end of the vertices. The load reads four coordinates,
-        // and for BYTES = 3 four bytes more: at most one coordinate and four bytes beyond the vertices, eight bytes, the tail's size.
+        // SAFETY: `PieceView::new` checked that the bytes hold every vertex of the lanes in the head and the tail after
+        // them, and that a test finds none but those lanes; `BYTES` is their format. `block` comes from such a test, so
+        // each place is at least three coordinates before the end of the vertices. The load reads four coordinates, and
+        // for BYTES = 3 four bytes more: at most one coordinate and four bytes beyond the vertices, eight bytes, the
+        // tail's size.
         let (low, high) = unsafe {
             (
                 k.integers::<BYTES>(piece.bytes, [at, at + next], base),
@@ -177,7 +183,8 @@ impl<K: Kernel> Rows<K> {
         Self { low: k.mul(self.low, scale), high: k.mul(self.high, scale) }
     }
 
-    /// First, second and third vertices of the eight triangles: first is v00 for half 0 and v11 for half 1, see the picture in mod.rs.
+    /// First, second and third vertices of the eight triangles: first is v00 for half 0 and v11 for half 1, see the
+    /// picture in mod.rs.
     #[inline(always)]
     fn corners(self, k: K) -> [K::F; 3] {
         [k.pick_0112(self.low, self.high), k.pick_1201(self.low, self.high), k.pick_0112(self.high, self.low)]
@@ -219,8 +226,8 @@ impl<K: Kernel> Eight<K> {
         (found.mask != 0).then_some(found)
     }
 
-    /// Twice the area between the ray and the edge from corner b to corner c: of two triangles that share an edge, one gets the exact
-    /// negative of the other's.
+    /// Twice the area between the ray and the edge from corner b to corner c: of two triangles that share an edge, one
+    /// gets the exact negative of the other's.
     #[inline(always)]
     fn edge(&self, k: K, b: usize, c: usize) -> K::F {
         k.sub(k.mul(self.x[c], self.y[b]), k.mul(self.y[c], self.x[b]))
@@ -246,7 +253,8 @@ struct Arrays {
 }
 
 impl Arrays {
-    /// Where an edge function vanished in single precision its sign is not known: decide in double precision, where products are exact.
+    /// Where an edge function vanished in single precision its sign is not known: decide in double precision, where
+    /// products are exact.
     #[cold]
     #[inline(never)]
     fn settle(&self, lanes: u32, t_max: f32, found: &mut Found) {

@@ -34,8 +34,9 @@ impl<K: Kernel> VertexRow<K> {
         let at = |axis: usize, first: usize| [0, 4].map(|more| piece.row_start(j, axis) + BYTES * (first + more));
         // No closure for the loads: it would be compiled without the kernel's instructions.
         let ([x, y, z], [next_x, next_y, next_z]) = ([at(0, 0), at(1, 0), at(2, 0)], [at(0, 1), at(1, 1), at(2, 1)]);
-        // SAFETY: `PieceView::new` checked that the bytes hold every vertex and the tail after them. There is such a row, and it has nine vertices, so that each
-        // place, vertex 0, 1, 4 or 5, is at least four coordinates before the row's end. The load reads four coordinates, and for BYTES = 3 four bytes more, fewer than the tail has.
+        // SAFETY: `PieceView::new` checked that the bytes hold every vertex and the tail after them. There is such a
+        // row, and it has nine vertices, so that each place, vertex 0, 1, 4 or 5, is at least four coordinates before
+        // the row's end. The load reads four coordinates, and for BYTES = 3 four bytes more, fewer than the tail has.
         let [low, high] = unsafe {
             [
                 [

@@ -59,7 +59,8 @@ impl DifferenceMap {
         *values.select_nth_unstable_by(rank.saturating_sub(1), f32::total_cmp).1
     }
 
-    /// Share of pixels (0 to 1) whose difference is above `limit`, by more than the way to linear values and back rounds it.
+    /// Share of pixels (0 to 1) whose difference is above `limit`, by more than the way to linear values and back
+    /// rounds it.
     pub fn share_above(&self, limit: f32) -> f64 {
         self.values.iter().filter(|&&d| is_above(d, limit)).count() as f64 / self.values.len() as f64
     }
@@ -101,8 +102,8 @@ pub(super) fn largest_difference(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).fold(0.0, |max, i| max.max((a[i] - b[i]).abs()))
 }
 
-/// A difference of two display values in single precision, each of which went to linear light and back, errs by less than this: pictures
-/// of 8 or 16 bits have differences of whole steps.
+/// A difference of two display values in single precision, each of which went to linear light and back, errs by less
+/// than this: pictures of 8 or 16 bits have differences of whole steps.
 const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
 
 /// Whether a difference is above a limit, roundings aside.

@@ -53,8 +53,8 @@ pub fn display_pixels(linear: &[[f32; 3]]) -> impl Iterator<Item = [f32; 3]> {
 
 /// The sRGB transfer function (IEC 61966-2-1), from linear to encoded, for 0..=1.
 pub fn srgb_from_linear(linear: f32) -> f32 {
-    // The power in f32, a third of the work in f64, is good to 1e-7. But in f32, 1.055 - 0.055 is less than 1: white would not
-    // be white.
+    // The power in f32, a third of the work in f64, is good to 1e-7. But in f32, 1.055 - 0.055 is less than 1: white
+    // would not be white.
     let curve = || (1.055 * f64::from(linear.powf(1.0 / 2.4)) - 0.055) as f32;
     if linear <= 0.003_130_8 { 12.92 * linear } else { curve() }
 }

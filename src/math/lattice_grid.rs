@@ -93,8 +93,8 @@ pub struct Rounding {
 pub const MOST_NEAR: usize = 32;
 
 impl Rounding {
-    /// Which of `n` (up to [`MOST_NEAR`]) vertices from (i, j) on, along axis 0 or 1 of the grid, have a coordinate within
-    /// the guard of a rounding boundary, as bits.
+    /// Which of `n` (up to [`MOST_NEAR`]) vertices from (i, j) on, along axis 0 or 1 of the grid, have a coordinate
+    /// within the guard of a rounding boundary, as bits.
     pub fn near(self, points: &PointGrid, from: [usize; 2], along: usize, n: usize) -> u32 {
         debug_assert!(n <= MOST_NEAR);
         let step = if along == 0 { 1 } else { points.stride() };
@@ -135,8 +135,8 @@ fn fraction<K: Kernel>(k: K, x: K::D) -> K::D {
     k.sub4(x, k.floor4(x))
 }
 
-/// Four numbers from the `i`-th on, `step` apart; in place of those from the `n`-th on, the last one, or what comes after
-/// it if that can be loaded at once.
+/// Four numbers from the `i`-th on, `step` apart; in place of those from the `n`-th on, the last one, or what comes
+/// after it if that can be loaded at once.
 #[inline(always)]
 fn four<K: Kernel>(k: K, numbers: &[f64], i: usize, n: usize, step: usize) -> K::D {
     if step == 1

@@ -1,4 +1,5 @@
-//! Points of a rectangle of cells before they are rounded: a list for each coordinate, so that four points are one register.
+//! Points of a rectangle of cells before they are rounded: a list for each coordinate, so that four points are one
+//! register.
 
 /// Lanes that are written at a time, so that as many less one behind a row may be overwritten.
 pub const LANES: usize = 4;

@@ -28,10 +28,10 @@ pub struct Ray {
     pub t_max: f32,
     /// The triangle the ray starts on, if any: it is not hit.
     pub from: Option<PrimitiveRef>,
-    /// How far above `from` the origin lies, if it does: a point of that triangle moved along its normal by no more than
-    /// this, in world space, to the side to which the ray leaves, far enough that rounding does not put it on the wrong
-    /// side of a neighbour. Such a ray need not be tested against surface that it cannot meet. `None` if the triangle has
-    /// no area, and so no normal.
+    /// How far above `from` the origin lies, if it does: a point of that triangle moved along its normal by no more
+    /// than this, in world space, to the side to which the ray leaves, far enough that rounding does not put it on the
+    /// wrong side of a neighbour. Such a ray need not be tested against surface that it cannot meet. `None` if the
+    /// triangle has no area, and so no normal.
     pub above: Option<f32>,
 }
 
@@ -42,7 +42,8 @@ impl Ray {
     }
 }
 
-/// A bundle of rays: those whose origin and direction lie within bounds, ends included. The length of a direction counts as it is.
+/// A bundle of rays: those whose origin and direction lie within bounds, ends included. The length of a direction
+/// counts as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayBounds {
     /// Around the origins.
@@ -116,7 +117,8 @@ pub trait Intersect {
     fn closest(&mut self, ray: &Ray) -> Option<Hit>;
     /// Whether anything is hit.
     fn occluded(&mut self, ray: &Ray) -> bool;
-    /// Announces rays: many of the next ones that [`closest`](Self::closest) is asked about are of this bundle. Answers do not depend on it.
+    /// Announces rays: many of the next ones that [`closest`](Self::closest) is asked about are of this bundle. Answers
+    /// do not depend on it.
     fn aim(&mut self, _bundle: &RayBounds) {}
     /// [`closest`](Self::closest) for each of the rays, in whatever order is fast; `hits` is as long as `rays`.
     fn closest_batch(&mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {

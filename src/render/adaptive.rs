@@ -1,30 +1,33 @@
 //! `--groups adaptive`: few rays, a bounded error.
 //!
 //! The picture is refined from cells of 16 pixels down to single ones. Nine **probes** of a cell are traced; it is
-//! interpolated only if they have seen one piece of smooth surface under the same lights, if no patch could have slipped
-//! between them (`footprint`), and if the four corner probes predict the five others within the
-//! tolerance. Otherwise it is split in four. A group in Ke's sense is a cell that holds; it may span several patches,
-//! wherever these are one smooth surface.
+//! interpolated only if they have seen one piece of smooth surface under the same lights, if no patch could have
+//! slipped between them (`footprint`), and if the four corner probes predict the five others within the tolerance.
+//! Otherwise it is split in four. A group in Ke's sense is a cell that holds; it may span several patches, wherever
+//! these are one smooth surface.
 //!
-//! What is interpolated (`between_probes`) is not colour but what varies smoothly (depth, normal, light from reflections), from
-//! the four nearest probes; direct light is then computed again for the pixel, so that highlights and patterns stay sharp. The
-//! four nearest are twice as close as those that the prediction was checked with, which for a smooth function makes the error
-//! a quarter of the one that was measured. Where the surface is may be in doubt by as much as depths of probes were off, or
-//! their tangent planes disagree; a pixel with the edge of a pattern in that reach is traced.
+//! What is interpolated (`between_probes`) is not colour but what varies smoothly (depth, normal, light from
+//! reflections), from the four nearest probes; direct light is then computed again for the pixel, so that highlights
+//! and patterns stay sharp. The four nearest are twice as close as those that the prediction was checked with, which
+//! for a smooth function makes the error a quarter of the one that was measured. Where the surface is may be in doubt
+//! by as much as depths of probes were off, or their tangent planes disagree; a pixel with the edge of a pattern in
+//! that reach is traced.
 //!
-//! What may be where is known from footprints; of shadows and mirror images they know nothing. These are followed (`follow`)
-//! from traced pixels into the cells that hold, within a tile and, once all tiles are there, across their seams (`canvas`).
+//! What may be where is known from footprints; of shadows and mirror images they know nothing. These are followed
+//! (`follow`) from traced pixels into the cells that hold, within a tile and, once all tiles are there, across their
+//! seams (`canvas`).
 //!
 //! # Invariants
 //! 1. Interpolation has no access to a tracer: an interpolated pixel touches no grid.
-//! 2. A tile depends on nothing but the scene, the camera and the settings, and on what the tiles around it show at their
-//!    sides before edges are followed across; tiles lie at multiples of 64 pixels, whatever the window. So neither threads nor
-//!    a crop change a pixel. A picture that was cancelled may lack edges that lead from one tile to the next.
-//! 3. A pixel that is not interpolated has, bit for bit, the colour that it has without groups; but where pixels have several
-//!    samples, some are settled with two of them (`samples`).
+//! 2. A tile depends on nothing but the scene, the camera and the settings, and on what the tiles around it show at
+//!    their sides before edges are followed across; tiles lie at multiples of 64 pixels, whatever the window. So
+//!    neither threads nor a crop change a pixel. A picture that was cancelled may lack edges that lead from one tile to
+//!    the next.
+//! 3. A pixel that is not interpolated has, bit for bit, the colour that it has without groups; but where pixels have
+//!    several samples, some are settled with two of them (`samples`).
 //!
-//! Ke, "Feature Adaptive Ray Tracing of Subdivision Surfaces", 2017, chapter 5.3 (groups); Akimoto et al., "Pixel-selected
-//! ray tracing", 1991 (refinement by prediction).
+//! Ke, "Feature Adaptive Ray Tracing of Subdivision Surfaces", 2017, chapter 5.3 (groups); Akimoto et al.,
+//! "Pixel-selected ray tracing", 1991 (refinement by prediction).
 
 use super::between_probes::{Errors, Interpolation};
 use super::canvas::{Canvas, Surprises, look};
@@ -51,12 +54,13 @@ use std::time::Instant;
 /// Probes whose normals are further from the others' mean than this, as a cosine, have a crease between them.
 pub(super) const CREASE_COSINE: f32 = 0.8;
 
-/// The same for what is reflected and refracted, as the length of a difference of normals times the share of their light: faint images
-/// may be turned as they like. With 0.63, two more of 150 pictures of mirrors lose a glint at one sample; with 0.2 as many are lost.
+/// The same for what is reflected and refracted, as the length of a difference of normals times the share of their
+/// light: faint images may be turned as they like. With 0.63, two more of 150 pictures of mirrors lose a glint at one
+/// sample; with 0.2 as many are lost.
 const MOST_TURNED: f32 = 0.4;
 
-/// How far from a pixel that contradicts others are traced. What is about a pixel thin comes and goes: with 1 instead of 2, 2 %
-/// fewer rays are traced on trex, and gaps of a pixel end a line.
+/// How far from a pixel that contradicts others are traced. What is about a pixel thin comes and goes: with 1 instead
+/// of 2, 2 % fewer rays are traced on trex, and gaps of a pixel end a line.
 const REACH: i32 = 2;
 
 /// Renders a picture, tracing only the pixels that need it.
@@ -103,8 +107,8 @@ pub fn render_adaptive<T: Tracer>(
     Rendered { film, rays, pixels, seconds, complete }
 }
 
-/// The pixels that have to be rendered for those that were asked for: whole tiles and those around them, because edges may
-/// come from there.
+/// The pixels that have to be rendered for those that were asked for: whole tiles and those around them, because edges
+/// may come from there.
 pub(super) fn canvas_window(settings: &RenderSettings) -> PixelRect {
     let picture = PixelRect::whole(settings.size);
     let PixelRect { x0, y0, x1, y1 } = aligned(settings.window);
@@ -286,8 +290,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
             self.tile.set_cell(&place, cell);
         }
         if !self.job.appearance.can_reshade() {
-            // A contradiction may be all that is seen of a thin shadow, and behind glass small things shine alone, with no edge
-            // that leads to them.
+            // A contradiction may be all that is seen of a thin shadow, and behind glass small things shine alone, with
+            // no edge that leads to them.
             self.tile.split_beside_edges(level);
         }
     }

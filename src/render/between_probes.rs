@@ -1,8 +1,8 @@
 //! Pixels between probes.
 //!
-//! What of four probes varies smoothly (depth, normal, light from reflections) is interpolated for a pixel between them; direct
-//! light is computed again for it. An [`Interpolation`] has what that needs, a picture's camera, appearance and settings, and
-//! nothing that could trace a ray.
+//! What of four probes varies smoothly (depth, normal, light from reflections) is interpolated for a pixel between
+//! them; direct light is computed again for it. An [`Interpolation`] has what that needs, a picture's camera,
+//! appearance and settings, and nothing that could trace a ray.
 
 use super::cells::{CELL_SIDES, Cell, CellPlace, Tile, TracedProbe};
 use super::film::{FirstHit, PixelRecord};
@@ -18,12 +18,13 @@ use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-/// Steps from one pixel to the next, in display units, that are followed whatever the tolerance: an edge may begin faintly. With
+/// Steps from one pixel to the next, in display units, that are followed whatever the tolerance: an edge may begin
+/// faintly. With
 /// 0.04, trex at 10/255 lost a shadow; 0.01 takes 8 % more rays there, and 3 % at 5/255.
 const MAX_EDGE: f32 = 0.01;
 
-/// How much further from the interpolation a surface may be than it was where that was checked, as far as patterns are concerned:
-/// facets have kinks. With 1, a globe of the tests had a sample on the wrong square.
+/// How much further from the interpolation a surface may be than it was where that was checked, as far as patterns are
+/// concerned: facets have kinks. With 1, a globe of the tests had a sample on the wrong square.
 const DOUBTS: f32 = 2.0;
 
 /// What rounding makes of an interpolated depth, relative to it: probes have it in single precision.
@@ -129,10 +130,10 @@ impl<'a> Interpolation<'a> {
         (0..n).map(move |i| DVec2::from(pixel.map(f64::from)) + subpixel(i))
     }
 
-    /// Whether some sample of a pixel of a cell that holds lies so near the edge of a pattern that it may be beyond: the ray is
-    /// known, and how far along it the surface is only as well as the probes' tangent planes agree with the interpolation, and
-    /// not better than `DOUBTS` times `doubt`, a depth. Where colours themselves are interpolated, those of the probes have to be
-    /// of the same square.
+    /// Whether some sample of a pixel of a cell that holds lies so near the edge of a pattern that it may be beyond:
+    /// the ray is known, and how far along it the surface is only as well as the probes' tangent planes agree with the
+    /// interpolation, and not better than `DOUBTS` times `doubt`, a depth. Where colours themselves are interpolated,
+    /// those of the probes have to be of the same square.
     pub fn may_show_edge_of_pattern(&self, tile: &Tile, place: &CellPlace, pixel: [u32; 2], doubt: f32) -> bool {
         let nearest = Nearest::new(tile, place, pixel);
         let corners = &nearest.corners;

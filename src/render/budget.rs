@@ -19,12 +19,13 @@ use crate::cache::SegmentCache;
 use crate::error::{Error, ErrorKind, Result};
 use std::fmt;
 
-/// Bytes that a worker may touch besides the cache: its stack, the scratch for blocks that are used once, evaluators, the pieces of a patch that is left,
-/// a tile of pixels, and what the allocator keeps for it.
+/// Bytes that a worker may touch besides the cache: its stack, the scratch for blocks that are used once, evaluators,
+/// the pieces of a patch that is left, a tile of pixels, and what the allocator keeps for it.
 pub const WORKER_BYTES: usize = SegmentCache::SCRATCH_BYTES + (768 << 10);
 
-/// Bytes that a worker may touch for each point of the largest ring of a face, beyond those of [`ORDINARY_RING`]: of 16 patches, for
-/// building and for shading, the points of some 30 levels are remembered. (Measured with polygons of 1000 and 4000 sides: 23 KiB.)
+/// Bytes that a worker may touch for each point of the largest ring of a face, beyond those of [`ORDINARY_RING`]: of 16
+/// patches, for building and for shading, the points of some 30 levels are remembered. (Measured with polygons of 1000
+/// and 4000 sides: 23 KiB.)
 const BYTES_PER_RING_POINT: usize = 24 << 10;
 
 /// Points of a ring that a worker has room for anyway.
@@ -51,8 +52,8 @@ pub struct RenderNeeds {
 }
 
 impl RenderNeeds {
-    /// The needs of a render on `threads` threads, of a world that needs `tables` bytes of slots and whose largest ring has so
-    /// many points, when `resident` bytes are resident.
+    /// The needs of a render on `threads` threads, of a world that needs `tables` bytes of slots and whose largest ring
+    /// has so many points, when `resident` bytes are resident.
     pub fn new(resident: u64, tables: usize, largest_ring: usize, settings: &RenderSettings, threads: usize) -> Self {
         let film = Film::n_bytes(settings.window, &settings.aovs) as u64;
         let of_rings = BYTES_PER_RING_POINT * largest_ring.saturating_sub(ORDINARY_RING);

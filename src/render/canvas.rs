@@ -1,9 +1,9 @@
 //! The film of a grouped render at work, and the seams between its tiles.
 //!
-//! Tiles are rendered one by one, each knowing nothing of the others. Once all are there, edges that end at the side of one
-//! are followed into the next, where a look across the seam surprises an interpolated pixel. They are followed within that
-//! tile alone, so that a pixel depends on its own tile and the eight around it: a crop renders those too, and shows what the
-//! whole picture shows.
+//! Tiles are rendered one by one, each knowing nothing of the others. Once all are there, edges that end at the side of
+//! one are followed into the next, where a look across the seam surprises an interpolated pixel. They are followed
+//! within that tile alone, so that a pixel depends on its own tile and the eight around it: a crop renders those too,
+//! and shows what the whole picture shows.
 
 use super::cells::TILE_SIDE;
 use super::film::{Aov, Film, PixelRecord};

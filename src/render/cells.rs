@@ -1,8 +1,8 @@
 //! The cells that a tile is refined into, and the probes at their corners and middles.
 //!
-//! A tile of 64 x 64 pixels has cells of 16, 8 and 4 pixels a side, aligned to the whole picture. A cell knows nine probes:
-//! its corners, the middles of its sides and its centre, at pixels' centres. Corners and middles on the right and at the
-//! bottom belong to the next cell's pixels, or the next tile's.
+//! A tile of 64 x 64 pixels has cells of 16, 8 and 4 pixels a side, aligned to the whole picture. A cell knows nine
+//! probes: its corners, the middles of its sides and its centre, at pixels' centres. Corners and middles on the right
+//! and at the bottom belong to the next cell's pixels, or the next tile's.
 
 use super::follow::Shown;
 use super::integrators::Probe;
@@ -13,8 +13,8 @@ use super::tracer::Built;
 /// Side of a tile in pixels. Smaller tiles share fewer probes, larger ones keep threads waiting at the end.
 pub(super) const TILE_SIDE: u32 = 64;
 
-/// Sides of the cells of each level. With 16, bigguy takes 12 % fewer rays than with 8; what ends between their probes is found
-/// by following it.
+/// Sides of the cells of each level. With 16, bigguy takes 12 % fewer rays than with 8; what ends between their probes
+/// is found by following it.
 pub(super) const CELL_SIDES: [u32; 3] = [16, 8, 4];
 
 /// Probes along a side of a tile.
@@ -170,8 +170,8 @@ impl Tile {
         (y * (TILE_SIDE / place.side) + x) as usize
     }
 
-    /// Splits the cells of a level that hold beside one with an edge or a contradiction in it. The silhouettes that matter to
-    /// the smallest cells are known from footprints.
+    /// Splits the cells of a level that hold beside one with an edge or a contradiction in it. The silhouettes that
+    /// matter to the smallest cells are known from footprints.
     pub fn split_beside_edges(&mut self, level: usize) {
         let n = (TILE_SIDE / CELL_SIDES[level]) as usize;
         let spreads = if level + 1 == CELL_SIDES.len() { Reason::is_edge_of_light } else { Reason::is_edge };

@@ -1,13 +1,14 @@
 //! Following edges from where they are seen into the groups around.
 //!
-//! Shadows and mirror images may end between the probes of a cell that holds. But what reaches into such a cell from outside
-//! is seen there, in pixels that are traced. An interpolated pixel is **surprised** by one beside it that was traced and is
-//! not as the interpolation, continued by a pixel, would have it. It is traced then, and if it turns out to **contradict** its
-//! interpolation, so are all those around it, two deep, and so on: an edge is followed, pixel by pixel, to its end.
+//! Shadows and mirror images may end between the probes of a cell that holds. But what reaches into such a cell from
+//! outside is seen there, in pixels that are traced. An interpolated pixel is **surprised** by one beside it that was
+//! traced and is not as the interpolation, continued by a pixel, would have it. It is traced then, and if it turns out
+//! to **contradict** its interpolation, so are all those around it, two deep, and so on: an edge is followed, pixel by
+//! pixel, to its end.
 //!
 //! # Invariants
-//! 1. Which pixels are traced does not depend on the order they are looked at in: a pixel is if it was surprised, which is
-//!    decided before any is followed, or lies close to one that contradicts.
+//! 1. Which pixels are traced does not depend on the order they are looked at in: a pixel is if it was surprised, which
+//!    is decided before any is followed, or lies close to one that contradicts.
 
 use super::cells::TILE_SIDE;
 use super::tiles::PixelRect;
@@ -37,7 +38,8 @@ pub(super) struct Look {
     pub mesh: u32,
 }
 
-/// Whether what lies one of the steps that `counts` from an interpolated pixel is not as that and the one behind let expect.
+/// Whether what lies one of the steps that `counts` from an interpolated pixel is not as that and the one behind let
+/// expect.
 pub(super) fn is_surprised(
     pixel: [u32; 2],
     tolerance: f32,
@@ -56,7 +58,8 @@ pub(super) fn is_surprised(
     })
 }
 
-/// Interpolated pixels of a tile beside a traced one: all that can be surprised. `origins` are those of its pixels, row by row.
+/// Interpolated pixels of a tile beside a traced one: all that can be surprised. `origins` are those of its pixels, row
+/// by row.
 pub(super) fn beside_traced(tile: PixelRect, origins: impl Iterator<Item = Origin>) -> impl Iterator<Item = [u32; 2]> {
     let mut traced = [0u128; TILE_SIDE as usize + 2];
     let mut interpolated = [0u128; TILE_SIDE as usize];
@@ -76,8 +79,8 @@ pub(super) fn beside_traced(tile: PixelRect, origins: impl Iterator<Item = Origi
     tile.pixels().filter(is_beside)
 }
 
-/// Goes on from each of the `waiting` pixels, up to `reach` pixels from one that contradicts. `trace` traces one if it is not
-/// traced yet, and then says whether it contradicts.
+/// Goes on from each of the `waiting` pixels, up to `reach` pixels from one that contradicts. `trace` traces one if it
+/// is not traced yet, and then says whether it contradicts.
 pub(super) fn follow(area: PixelRect, reach: i32, mut waiting: Vec<[u32; 2]>, mut trace: impl FnMut([u32; 2]) -> bool) {
     while let Some(pixel) = waiting.pop() {
         if trace(pixel) {

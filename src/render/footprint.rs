@@ -1,18 +1,18 @@
 //! Footprints: the pixels that a patch may reach, known before anything is tessellated.
 //!
-//! A box that holds every vertex that dicing would give covers a rectangle of the picture that holds every pixel at which
-//! a ray could hit the patch. Proxies promise no such thing: a proxy may miss a pixel that its patch covers, and so lose a
-//! small object. The boxes of whole patches are those of the tree that rays go through. A **part** of a patch is a
-//! rectangle of its cells; it is made when someone has to look closer, down to about 8 x 8 pixels. Each has its nearest
-//! depth and its **side**: towards the eye with its outside or with its inside all over, or mixed, when there may be a
-//! silhouette or a mesh's border within.
+//! A box that holds every vertex that dicing would give covers a rectangle of the picture that holds every pixel at
+//! which a ray could hit the patch. Proxies promise no such thing: a proxy may miss a pixel that its patch covers, and
+//! so lose a small object. The boxes of whole patches are those of the tree that rays go through. A **part** of a patch
+//! is a rectangle of its cells; it is made when someone has to look closer, down to about 8 x 8 pixels. Each has its
+//! nearest depth and its **side**: towards the eye with its outside or with its inside all over, or mixed, when there
+//! may be a silhouette or a mesh's border within.
 //!
 //! Footprints are found for a tile at a time, so their memory is that of a tile, whatever the scene.
 //!
 //! # Invariants
 //! 1. A pixel that is not covered is missed by every ray through it.
-//! 2. A set of pixels all of whose footprints show one side and belong to patches next to one another shows one connected
-//!    piece of surface, silhouettes included.
+//! 2. A set of pixels all of whose footprints show one side and belong to patches next to one another shows one
+//!    connected piece of surface, silhouettes included.
 
 use super::cells::TILE_SIDE;
 use super::projection::{MeshView, ScreenBox};
@@ -35,8 +35,8 @@ const COARSE: f32 = 20.0;
 /// Side, in pixels, of the largest parts that show in four corners which side is seen of them.
 const MAX_SIDED: f32 = 36.0;
 
-/// Most parts that one is cut into, along each side. With 4, cuts are fewer and boxes that nobody asks about more: 4 to 6 % more
-/// time on trex, monsterfrog and bigguy, for 2 % fewer rays.
+/// Most parts that one is cut into, along each side. With 4, cuts are fewer and boxes that nobody asks about more: 4 to
+/// 6 % more time on trex, monsterfrog and bigguy, for 2 % fewer rays.
 const PIECES: u32 = 2;
 
 /// Patches of a tile in which grouping pays: with more there is one for every six pixels, or many behind one another.
@@ -292,7 +292,8 @@ impl<'a> Footprints<'a> {
         }
     }
 
-    /// Whether what may be seen of a part is as claimed; `touches`, if known, whether its patch touches one that was hit.
+    /// Whether what may be seen of a part is as claimed; `touches`, if known, whether its patch touches one that was
+    /// hit.
     fn agrees(&mut self, k: usize, pixels: [u8; 4], claim: &Claim<'_>, touches: Option<bool>) -> bool {
         let part = &self.parts[k];
         if !part.is_seen(pixels, claim.farthest) {
@@ -442,8 +443,8 @@ fn is_in_cell(i: [u32; 2], j: [u32; 2]) -> bool {
 
 /// The vertices of one cell, (0,0), (1,0), (0,1) and (1,1), in lattice units, before they are rounded.
 ///
-/// Its two triangles meet from (1,0) to (0,1). Parts of it are halves of halves, so that this line passes through corners of a
-/// part or misses it.
+/// Its two triangles meet from (1,0) to (0,1). Parts of it are halves of halves, so that this line passes through
+/// corners of a part or misses it.
 struct CellCorners([DVec3; 4]);
 
 impl CellCorners {

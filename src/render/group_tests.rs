@@ -148,7 +148,8 @@ impl<T: Tracer> Tracer for Witness<'_, T> {
     }
 }
 
-/// All rays start at camera rays, and all grids are touched by rays: so what no camera ray was asked for touched no grid.
+/// All rays start at camera rays, and all grids are touched by rays: so what no camera ray was asked for touched no
+/// grid.
 #[test]
 fn an_interpolated_pixel_touches_no_grid() {
     let stage = Stage::plain();

@@ -2,8 +2,8 @@
 
 use glam::{DVec2, Vec3};
 
-/// Place (u, v) of `p` in the bilinear quad with corners at (0,0), (1,0), (1,1) and (0,1), each in 0..=1; a point outside
-/// gets the nearest parameters along each axis. `None` where the quad has no area to speak of.
+/// Place (u, v) of `p` in the bilinear quad with corners at (0,0), (1,0), (1,1) and (0,1), each in 0..=1; a point
+/// outside gets the nearest parameters along each axis. `None` where the quad has no area to speak of.
 pub fn inverse_bilinear(p: DVec2, [a, b, c, d]: [DVec2; 4]) -> Option<DVec2> {
     let (e, f, g, h) = (b - a, d - a, a - b + c - d, p - a);
     let (k0, k1, k2) = (h.perp_dot(e), e.perp_dot(f) + h.perp_dot(g), g.perp_dot(f));

@@ -1,9 +1,9 @@
 //! The item buffer: which patch is seen at each pixel's centre, without tessellating anything.
 //!
-//! Every patch stands in as a **proxy**, the bilinear quad of its four limit corners, cut into two triangles like a cell
-//! of a grid. With `facets` above 1 a proxy is finer: the quads of the uniformly subdivided patch, each an item of its
-//! own, as in the thesis. Threads take patches and write pixels with an atomic minimum over (depth, item), so the buffer
-//! is the same for any number of threads and any order.
+//! Every patch stands in as a **proxy**, the bilinear quad of its four limit corners, cut into two triangles like a
+//! cell of a grid. With `facets` above 1 a proxy is finer: the quads of the uniformly subdivided patch, each an item of
+//! its own, as in the thesis. Threads take patches and write pixels with an atomic minimum over (depth, item), so the
+//! buffer is the same for any number of threads and any order.
 //!
 //! Weghorst, Hooper and Greenberg, "Improved computational methods for ray tracing", 1984 (the item buffer); Ke 2017.
 

@@ -4,8 +4,8 @@
 //! How far along a ray a hit lies is known to single precision of that distance: too little for far cameras. So the
 //! position is not taken from the ray but from the triangle, as a weighted sum of its corners in double precision: the
 //! camera's distance plays no part. A ray that leaves is told which triangle not to hit; what it could still hit by
-//! mistake are that triangle's neighbours. Tests of triangles err by some 2^-21 of the distance from the ray's origin to
-//! the edge that is tested (`LatticeRay` has the sums), here the triangle's own size, and by the rounding of world
+//! mistake are that triangle's neighbours. Tests of triangles err by some 2^-21 of the distance from the ray's origin
+//! to the edge that is tested (`LatticeRay` has the sums), here the triangle's own size, and by the rounding of world
 //! coordinates. A start that is 2^-20 of the triangle's size before it, the **clearance**, and four times that away
 //! from its edges is on the right side of every neighbour, those of a concave crease included unless it is sharper than
 //! 14 degrees.

@@ -17,8 +17,9 @@
 //! 2. Nothing is allocated per ray, pixel or tile.
 //! 3. Colours are linear RGB radiance; the film never tone maps.
 //!
-//! With **pixel groups** most pixels are not traced: an [`item_buffer`] of proxies, [`groups`] of equal pixels and their
-//! interpolation are Ke's published algorithm ([`thesis`]); `footprint` and [`adaptive`] are ours, with a bounded error.
+//! With **pixel groups** most pixels are not traced: an [`item_buffer`] of proxies, [`groups`] of equal pixels and
+//! their interpolation are Ke's published algorithm ([`thesis`]); `footprint` and [`adaptive`] are ours, with a bounded
+//! error.
 //!
 //! Read [`tracer`] first, then [`integrators`], [`film`] and [`workers`]; then [`adaptive`].
 

@@ -42,7 +42,8 @@ impl PatchNumbers {
         (MeshId::from(mesh), PatchId(number - self.first[mesh]))
     }
 
-    /// Calls `work` for every patch with a surface, on `threads` threads, each with a state of its own; returns the states.
+    /// Calls `work` for every patch with a surface, on `threads` threads, each with a state of its own; returns the
+    /// states.
     pub fn for_each<S: Send>(
         &self,
         world: &World,

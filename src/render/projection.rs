@@ -5,7 +5,8 @@ use crate::scene::camera::Camera;
 use crate::scene::world::WorldMesh;
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
-/// Depth that boxes are clipped at, in distances between the eye and what it looks at: nothing nearer is taken into account.
+/// Depth that boxes are clipped at, in distances between the eye and what it looks at: nothing nearer is taken into
+/// account.
 const NEAR: f64 = 1e-7;
 
 /// A mesh as a camera sees it.

@@ -24,7 +24,8 @@ fn unit(bits: u32) -> f64 {
     f64::from(bits) * 2f64.powi(-32)
 }
 
-/// The position of sample `index` in every pixel, in [0,1)²: the R2 sequence (Roberts 2018), which starts at the centre.
+/// The position of sample `index` in every pixel, in [0,1)²: the R2 sequence (Roberts 2018), which starts at the
+/// centre.
 ///
 /// All pixels share the pattern. Sample 0 of any number of samples is the one sample of `spp = 1`.
 pub fn subpixel(index: u32) -> DVec2 {

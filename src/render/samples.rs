@@ -1,14 +1,16 @@
 //! Several samples a pixel, and few where they would be alike.
 //!
-//! Of every pixel that is not interpolated the first sample is traced, before any other. Where it is **even** with those
-//! around it a second one decides: if that agrees, the pixel is **settled** with two. All others take every sample. Pixels are
-//! even if they show nearly the same colour, and their light has taken the same way; if it has taken another there is an edge
-//! somewhere between, which does not matter if both its sides have the same colour and the surface goes on across it.
+//! Of every pixel that is not interpolated the first sample is traced, before any other. Where it is **even** with
+//! those around it a second one decides: if that agrees, the pixel is **settled** with two. All others take every
+//! sample. Pixels are even if they show nearly the same colour, and their light has taken the same way; if it has taken
+//! another there is an edge somewhere between, which does not matter if both its sides have the same colour and the
+//! surface goes on across it.
 //!
-//! What is thinner than a pixel may lie between the first two samples of some pixels along it, but not of all. So a pixel stays
-//! settled only while all samples of the pixels around it are like its own: where one is not, it takes every sample as well, and
-//! so on along the line, as edges are followed into groups. Patterns are looked up: nothing is settled where one of their edges
-//! passes. What glass shows, and mirrors of something bright, may be as small as a point, and has to be more alike.
+//! What is thinner than a pixel may lie between the first two samples of some pixels along it, but not of all. So a
+//! pixel stays settled only while all samples of the pixels around it are like its own: where one is not, it takes
+//! every sample as well, and so on along the line, as edges are followed into groups. Patterns are looked up: nothing
+//! is settled where one of their edges passes. What glass shows, and mirrors of something bright, may be as small as a
+//! point, and has to be more alike.
 //!
 //! # Invariants
 //! 1. A settled pixel has two samples, any other traced one has all, bit for bit those that it has without groups.
@@ -30,8 +32,8 @@ const SETTLED: u32 = 2;
 /// How far from a pixel settled ones take all samples if one of its own is not like theirs.
 const REACH: i32 = 1;
 
-/// How far the way between two points of one surface may lead out of their tangent planes, as a sine. Where normals turn as far as
-/// they may, a circle has 0.32.
+/// How far the way between two points of one surface may lead out of their tangent planes, as a sine. Where normals
+/// turn as far as they may, a circle has 0.32.
 const MAX_SINE: f64 = 0.3;
 
 impl<T: Tracer> Worker<'_, '_, T> {
@@ -95,7 +97,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
         beside.any(|beside| beside.seen.iter().any(|seen| own.shown.difference(*seen) > most))
     }
 
-    /// Traces a second sample of a pixel; whether it agrees with the first: what is smaller than a pixel, neighbours do not show.
+    /// Traces a second sample of a pixel; whether it agrees with the first: what is smaller than a pixel, neighbours do
+    /// not show.
     fn is_confirmed(&mut self, pixel: [u32; 2], exposure: &mut Exposure) -> bool {
         let Some(first) = self.tile.probe(pixel).map(|probe| probe.shown) else { return false };
         self.job.pixels().expose(&mut self.shader, pixel, exposure, SETTLED);
@@ -110,14 +113,15 @@ impl<T: Tracer> Worker<'_, '_, T> {
             None => matches!(self.tile.find(beside).1, Cell::Holds { .. }),
         };
         let area = self.tile.area();
-        // What reaches a pixel and was not seen in it is thin: samples that miss cost little, so that background is never even.
+        // What reaches a pixel and was not seen in it is thin: samples that miss cost little, so that background is
+        // never even.
         around(area, pixel, 1).count() == 9
             && around(area, pixel, 1).all(is_alike)
             && own.probe.smooth.is_some_and(|own| self.shows_no_edge_of_pattern(pixel, own.mesh))
     }
 
-    /// Whether the mesh that a pixel and those around it show has no pattern, or all their centres, between which the pixel's
-    /// samples lie, are on one square of it.
+    /// Whether the mesh that a pixel and those around it show has no pattern, or all their centres, between which the
+    /// pixel's samples lie, are on one square of it.
     fn shows_no_edge_of_pattern(&self, pixel: [u32; 2], mesh: MeshId) -> bool {
         let position = |pixel: [u32; 2]| {
             let smooth = self.tile.probe(pixel)?.probe.smooth?;
@@ -130,9 +134,9 @@ impl<T: Tracer> Worker<'_, '_, T> {
         !self.job.appearance.is_patterned(mesh) || around(self.tile.area(), pixel, 1).all(has_one_color)
     }
 
-    /// Whether samples between two pixels are like those at their centres, as far as one can tell. A pixel reaches half way to
-    /// the next, so that twice the tolerance may lie between them where colour changes smoothly. Light that took another way
-    /// tells of an edge nearby, beyond which all of a pixel's samples may lie.
+    /// Whether samples between two pixels are like those at their centres, as far as one can tell. A pixel reaches half
+    /// way to the next, so that twice the tolerance may lie between them where colour changes smoothly. Light that took
+    /// another way tells of an edge nearby, beyond which all of a pixel's samples may lie.
     fn is_alike(&self, (pixel, own): Place<'_>, (beside, other): Place<'_>) -> bool {
         let (difference, tolerance) = (own.shown.difference(other.shown), self.job.settings.tolerance);
         if own.probe.trail() == other.probe.trail() {
@@ -147,8 +151,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
         seen.probe.smooth.is_some_and(|smooth| !self.job.appearance.reflects_little(smooth.mesh))
     }
 
-    /// Whether a smooth surface leads from what is seen at one pixel to what is seen at the other: neither a border, with which
-    /// thin things begin, nor a crease is between them.
+    /// Whether a smooth surface leads from what is seen at one pixel to what is seen at the other: neither a border,
+    /// with which thin things begin, nor a crease is between them.
     fn is_one_surface(&self, (pixel, own): Place<'_>, (beside, other): Place<'_>) -> bool {
         let (Some(from), Some(to)) = (own.probe.smooth, other.probe.smooth) else { return false };
         let way = self.position_at(beside, to.inverse_depth) - self.position_at(pixel, from.inverse_depth);

@@ -30,7 +30,8 @@ pub struct RenderSettings {
     pub aovs: Vec<Aov>,
     /// Which pixels are traced.
     pub groups: Groups,
-    /// Largest error that `groups` aims at, in display units: 0 to 1 after clamping and sRGB. 0 traces every pixel.
+    /// Error that `groups` aims at, in display units (0 to 1 after clamping and sRGB): at most 1 % of pixels are
+    /// further off. 0 traces every pixel.
     pub tolerance: f32,
 }
 

@@ -1,12 +1,12 @@
 //! `--groups thesis`: Ke 2017, chapter 5.3, as published, the baseline for everything else.
 //!
-//! Groups of pixels with the same item are found by breadth-first search; of each, the topmost, bottommost, leftmost and
-//! rightmost pixel are traced, and the colours of the others are interpolated bilinearly between them. Nothing is checked,
-//! so what lies between the corners, say a shadow's edge, is lost. Pixels without an item show the background.
+//! Groups of pixels with the same item are found by breadth-first search; of each, the topmost, bottommost, leftmost
+//! and rightmost pixel are traced, and the colours of the others are interpolated bilinearly between them. Nothing is
+//! checked, so what lies between the corners, say a shadow's edge, is lost. Pixels without an item show the background.
 //!
-//! The thesis does not say how four outermost pixels span a bilinear quad. Here they are the quad top, right, bottom, left;
-//! a pixel outside of it gets the nearest parameters, and in a group without extent in some direction, whose quad has no
-//! area, the colour of the nearest corner.
+//! The thesis does not say how four outermost pixels span a bilinear quad. Here they are the quad top, right, bottom,
+//! left; a pixel outside of it gets the nearest parameters, and in a group without extent in some direction, whose quad
+//! has no area, the colour of the nearest corner.
 
 use super::film::{Film, PixelRecord};
 use super::groups::{NO_GROUP, PixelGroups};

@@ -42,7 +42,8 @@ pub struct GroupSeconds {
     pub interpolate: f64,
 }
 
-/// Renders a picture, every pixel. Each worker thread calls `make_tracer` once and drops its tracer when no tile is left.
+/// Renders a picture, every pixel. Each worker thread calls `make_tracer` once and drops its tracer when no tile is
+/// left.
 pub fn render<T: Tracer>(
     camera: &Camera,
     appearance: &Appearance,

@@ -114,7 +114,8 @@ pub struct GeometryReport {
     pub resident_bytes: u64,
     /// Triangles of the full tessellation.
     pub full_triangles: u64,
-    /// Bytes of the full tessellation with its hierarchy, estimated: in the cache's own format, with 3 bytes a coordinate.
+    /// Bytes of the full tessellation with its hierarchy, estimated: in the cache's own format, with 3 bytes a
+    /// coordinate.
     pub full_bytes: u64,
 }
 

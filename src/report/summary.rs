@@ -62,7 +62,7 @@ impl RenderStatistics {
         let share = percent(g.patches_touched as u64, g.patches as u64);
         writeln!(f, "patches   {touched} of {patches} touched ({share}), {} grids built", Count(g.grids_built))?;
         let GeometryReport { full_triangles, full_bytes, .. } = *g;
-        writeln!(f, "in full   {} triangles, {}: never built", Count(full_triangles), Bytes(full_bytes))
+        writeln!(f, "in full   {} triangles, about {}: never built", Count(full_triangles), Bytes(full_bytes))
     }
 
     fn write_cache(&self, f: &mut Formatter<'_>) -> fmt::Result {
@@ -135,7 +135,7 @@ picture   800 x 600, 480,000 pixels rendered, 1 sample each
 rays      1,680,000: 480,000 primary, 1,200,000 shadow; 840,000 a second
 groups    120,000 pixels traced (25.0 %), 300,000 interpolated, 60,000 of background
 patches   10,999 of 11,000 touched (99.9 %), 70,000 grids built
-in full   91,000,000 triangles, 700.0 MiB: never built
+in full   91,000,000 triangles, about 700.0 MiB: never built
 cache     16.0 MiB, at most 0 bytes in use; 0.0 % of 1,000 lookups hit
 misses    0 compulsory, 0 for lack of room, 0 other; 0 bytes built
 memory    100.0 MiB at most, 0 bytes of it for the scene

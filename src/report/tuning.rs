@@ -85,8 +85,8 @@ pub struct Tuning {
     pub best_segments: (usize, f64),
 }
 
-/// Sizes that are replayed, at least: with less, what rays hold at the moment is a good part of the cache, and what several
-/// threads have of it, which a replay by one thread does not know.
+/// Sizes that are replayed, at least: with less, what rays hold at the moment is a good part of the cache, and what
+/// several threads have of it, which a replay by one thread does not know.
 const LEAST_SIZE: usize = 64 << 10;
 
 /// From hit rates to seconds.
@@ -200,8 +200,8 @@ fn smallest_within(replay: &Replay, time: &TimeModel, seconds: f64, curve: &[Cur
     fits
 }
 
-/// Where the curve is farthest above the line from its first to its last point, sizes by their logarithm (Satopaa et al.
-/// 2011).
+/// Where the curve is farthest above the line from its first to its last point, sizes by their logarithm (Satopaa et
+/// al. 2011).
 fn knee(curve: &[CurvePoint]) -> u64 {
     let (Some(first), Some(last)) = (curve.first(), curve.last()) else { return 0 };
     let gain = (last.hit_rate - first.hit_rate).max(f64::MIN_POSITIVE);

@@ -1,9 +1,10 @@
 //! Taking aim: where a bundle of rays that is announced begins, a front in the tree of every mesh that it may meet.
 //!
-//! Whoever traces a tile of a picture knows its camera rays beforehand: all start at the eye, and go about the same way. What they have in common is
-//! found once. A ray that was not announced is traced from the root.
+//! Whoever traces a tile of a picture knows its camera rays beforehand: all start at the eye, and go about the same
+//! way. What they have in common is found once. A ray that was not announced is traced from the root.
 //!
-//! Camera rays of a tile of 16 x 16 are traced 1.1 to 1.4 times as fast as from the root (notes/performance.md, "Bundles").
+//! Camera rays of a tile of 16 x 16 are traced 1.1 to 1.4 times as fast as from the root (notes/performance.md,
+//! "Bundles").
 
 use super::accel::Front;
 use super::world::{World, WorldMesh};
@@ -11,8 +12,8 @@ use crate::ids::MeshId;
 use crate::math::simd::{Kernel, Task};
 use crate::math::{DBounds, Ray, RayBounds};
 
-/// Directions of a bundle differ by less than this share of their greatest component, axis by axis: rays that have less in common are
-/// traced from the root.
+/// Directions of a bundle differ by less than this share of their greatest component, axis by axis: rays that have less
+/// in common are traced from the root.
 const MOST_SPREAD: f64 = 0.2;
 
 /// A bundle that may meet more meshes is traced from the root.
@@ -35,7 +36,8 @@ impl Default for Aim {
 }
 
 impl Aim {
-    /// Whether the ray may be of the bundle, seen from one coordinate: enough for rays that start elsewhere. If it may there is a front.
+    /// Whether the ray may be of the bundle, seen from one coordinate: enough for rays that start elsewhere. If it may
+    /// there is a front.
     #[inline(always)]
     pub fn may_contain(&self, ray: &Ray) -> bool {
         let DBounds { min, max } = self.bundle.origin;

@@ -1,8 +1,9 @@
-//! Batches of rays, traced in an order of the tracer's own: rays that need the same blocks come after one another, whatever
-//! order the caller has them in.
+//! Batches of rays, traced in an order of the tracer's own: rays that need the same blocks come after one another,
+//! whatever order the caller has them in.
 //!
-//! A ray's **key** is the cell of the world's box that the ray starts in, or enters the box in: numbers of three bits (x, y,
-//! z) along a Morton curve, from the whole box down. The octant of its direction stands between the coarse and the fine ones.
+//! A ray's **key** is the cell of the world's box that the ray starts in, or enters the box in: numbers of three bits
+//! (x, y, z) along a Morton curve, from the whole box down. The octant of its direction stands between the coarse and
+//! the fine ones.
 //!
 //! ```text
 //! 63                                 32 31          0
@@ -11,9 +12,10 @@
 //!
 //! The order is a matter of speed alone: rays do not depend on each other, so answers are those of single rays.
 //!
-//! Other keys, measured with 235,520 shuffled diffuse rays on trex at rate 16, a tenth of the touched bytes as cache (million
-//! rays a second; one by one in the given order 0.07): cell alone 0.53, this 0.56, octant first 0.30; the cell that the ray
-//! leaves the box in first 0.24, its numbers in turn with those of the start 0.42, after three of them 0.55.
+//! Other keys, measured with 235,520 shuffled diffuse rays on trex at rate 16, a tenth of the touched bytes as cache
+//! (million rays a second; one by one in the given order 0.07): cell alone 0.53, this 0.56, octant first 0.30; the cell
+//! that the ray leaves the box in first 0.24, its numbers in turn with those of the start 0.42, after three of them
+//! 0.55.
 
 use crate::math::{DBounds, Ray};
 use glam::{DVec3, UVec3};
@@ -52,7 +54,8 @@ impl BatchOrder {
         Self { bounds, cells_per_unit: f64::from(1u32 << CELL_BITS) / size, keyed: Vec::new() }
     }
 
-    /// The order in which to trace these rays, at most [`MOST_RAYS`]. Its memory is used again after [`keep`](Self::keep).
+    /// The order in which to trace these rays, at most [`MOST_RAYS`]. Its memory is used again after
+    /// [`keep`](Self::keep).
     pub fn of(&mut self, rays: &[Ray]) -> Order {
         let mut keyed = std::mem::take(&mut self.keyed);
         keyed.clear();

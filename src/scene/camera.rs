@@ -69,8 +69,8 @@ impl Camera {
 
     /// The bundle of the rays through a part of a picture of `size` pixels, between two corners in pixels.
     ///
-    /// A component of a direction of length 1 differs from a blend of those at the corners by an eighth of the second derivatives, which are 3 at most, times the squares of
-    /// the sides on the plane at distance 1.
+    /// A component of a direction of length 1 differs from a blend of those at the corners by an eighth of the second
+    /// derivatives, which are 3 at most, times the squares of the sides on the plane at distance 1.
     pub fn bundle(&self, [low, high]: [DVec2; 2], size: [u32; 2]) -> RayBounds {
         let corners = [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)];
         let bundle: RayBounds = corners.into_iter().map(|corner| self.ray(corner, size)).collect();
@@ -111,7 +111,8 @@ impl CameraDescription {
         Self { eye, at, up: DVec3::Y, fov: DEFAULT_FOV }
     }
 
-    /// The same for pictures of that size: if they are narrower than 4 to 3, from so far away that they are as wide as such a one.
+    /// The same for pictures of that size: if they are narrower than 4 to 3, from so far away that they are as wide as
+    /// such a one.
     pub fn for_pictures_of(self, [width, height]: [u32; 2]) -> Self {
         let narrower = 4.0 * f64::from(height) / (3.0 * f64::from(width));
         if narrower > 1.0 { Self { eye: self.at + narrower * (self.eye - self.at), ..self } } else { self }

@@ -23,8 +23,8 @@ pub fn camera_of(description: &SceneDescription, meshes: &[ControlMesh], size: [
 }
 
 /// Prepares all meshes for tracing. Every mesh of the description must have its rate; pixels are those of a picture
-/// `height` pixels high seen through `camera`. `progress` is called with a number of control faces that are as good as ready, `planned`
-/// with a share of the plans of one of the meshes ([`Watch::planned`]).
+/// `height` pixels high seen through `camera`. `progress` is called with a number of control faces that are as good as
+/// ready, `planned` with a share of the plans of one of the meshes ([`Watch::planned`]).
 pub fn compile(
     description: &SceneDescription,
     meshes: Vec<ControlMesh>,

@@ -1,10 +1,12 @@
-//! Rays that leave a patch so high that they do not meet it again, or meet nothing at all: most secondary rays. Their own patch would
-//! otherwise be what they are tested against most, since they start in the midst of its boxes.
+//! Rays that leave a patch so high that they do not meet it again, or meet nothing at all: most secondary rays. Their
+//! own patch would otherwise be what they are tested against most, since they start in the midst of its boxes.
 //!
-//! How high a patch rises above each part of itself, its [`Horizon`], is found from its pieces when enough rays have left it. When many more have cleared that, its [`Skyline`] is found, which says as much
-//! of all that is seen from the patch: rays that clear that need no walk. Pieces that are
-//! not in the cache, and of a skyline's own patch all, are diced for it and forgotten, so that what is tested does not depend on what the cache holds: a trace of look-ups can be replayed for
-//! any size. Both are remembered as long as no other patch takes their place. They decide only what is tested, never what is hit.
+//! How high a patch rises above each part of itself, its [`Horizon`], is found from its pieces when enough rays have
+//! left it. When many more have cleared that, its [`Skyline`] is found, which says as much of all that is seen from the
+//! patch: rays that clear that need no walk. Pieces that are not in the cache, and of a skyline's own patch all, are
+//! diced for it and forgotten, so that what is tested does not depend on what the cache holds: a trace of look-ups can
+//! be replayed for any size. Both are remembered as long as no other patch takes their place. They decide only what is
+//! tested, never what is hit.
 
 use super::builder::{Builder, PatchContext};
 use super::pieces::{n_pieces, with_pieces};
@@ -19,23 +21,24 @@ use serde::Serialize;
 use std::ops::AddAssign;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-/// Patches whose horizons are remembered at most: 2 MiB. With a quarter of them, occlusion, diffuse and shuffled rays on meshes of 30,000 faces (38,000 to
-/// 47,000 patches; rates 8 and 16) ran at 0.87 to 1.00 of the speed.
+/// Patches whose horizons are remembered at most: 2 MiB. With a quarter of them, occlusion, diffuse and shuffled rays
+/// on meshes of 30,000 faces (38,000 to 47,000 patches; rates 8 and 16) ran at 0.87 to 1.00 of the speed.
 const MOST_HORIZONS: usize = 1 << 16;
 
 /// Patches whose skylines are remembered at most: 2.5 MiB. Four times as many gain nothing more there.
 const MOST_SKYLINES: usize = 1 << 14;
 
-/// Pieces of a patch whose horizon is found at most. With 64 instead, ambient occlusion of bigguy and monsterfrog at 1920x1080 and one cell a pixel
-/// took 1.14 and 1.09 times as long.
+/// Pieces of a patch whose horizon is found at most. With 64 instead, ambient occlusion of bigguy and monsterfrog at
+/// 1920x1080 and one cell a pixel took 1.14 and 1.09 times as long.
 const MOST_PIECES: usize = 256;
 
-/// Rays that leave a patch, for each of its pieces, before its horizon is found. Renders by pixel groups send few: trex at 960x540 took 0.2 % more
-/// instructions with 16 than with 8, and as many at 1920x1080 with 4 as with 8.
+/// Rays that leave a patch, for each of its pieces, before its horizon is found. Renders by pixel groups send few: trex
+/// at 960x540 took 0.2 % more instructions with 16 than with 8, and as many at 1920x1080 with 4 as with 8.
 const RAYS_PER_PIECE: u32 = 8;
 
-/// Rays that clear the horizon of a patch before its skyline is found, and for each of its pieces so many more. To find it takes some 80 µs for patches of one
-/// piece, 135 for four and 310 for sixteen, and spares a ray 30 to 50 ns on average: about as many rays win that back.
+/// Rays that clear the horizon of a patch before its skyline is found, and for each of its pieces so many more. To find
+/// it takes some 80 µs for patches of one piece, 135 for four and 310 for sixteen, and spares a ray 30 to 50 ns on
+/// average: about as many rays win that back.
 const RAYS_BEFORE_SKYLINE: [u32; 2] = [1664, 160];
 
 /// One of so many of them is counted: who counts writes what all threads read.
@@ -44,8 +47,8 @@ const RAYS_PER_COUNT: u32 = 32;
 /// Pieces of a patch whose skyline is found at most: those of all its neighbours are looked at as well.
 const MOST_PIECES_OF_SKYLINE: usize = 16;
 
-/// If the mean openness of a mesh's skylines so far, in percent, is less, few more are sought: where few rays clear them they do not
-/// win back what they take.
+/// If the mean openness of a mesh's skylines so far, in percent, is less, few more are sought: where few rays clear
+/// them they do not win back what they take.
 const LEAST_OPENNESS: u32 = 40;
 
 /// Skylines from which that is seen.
@@ -85,8 +88,8 @@ pub struct DepartureCounts {
     pub horizons: u64,
     /// Skylines found, likewise.
     pub skylines: u64,
-    /// Rays that left above a skyline, and were not walked at all. (Those that pass their own patch by alone are too many to be
-    /// counted: primary rays ran at 0.99 of the speed.)
+    /// Rays that left above a skyline, and were not walked at all. (Those that pass their own patch by alone are too
+    /// many to be counted: primary rays ran at 0.99 of the speed.)
     pub rays_past_all: u64,
 }
 
@@ -190,7 +193,8 @@ impl Departures {
         MemoTable::<3>::bytes_for(n_horizons) + MemoTable::<{ Skyline::WORDS }>::bytes_for(n_skylines)
     }
 
-    /// Whether a ray that starts there is known to meet nothing of the mesh, by the skyline of its patch. `direction` is its direction in the lattice.
+    /// Whether a ray that starts there is known to meet nothing of the mesh, by the skyline of its patch. `direction`
+    /// is its direction in the lattice.
     #[inline(always)]
     pub fn meets_nothing<K: Kernel>(&self, k: K, start: Option<Start>, direction: K::D, mesh: &WorldMesh) -> bool {
         let Some(Start { number, cell, above, .. }) = start else { return false };
@@ -215,7 +219,8 @@ impl Departures {
 
     /// Whether a ray has left the patch it starts on, once enough rays have that its horizon is found.
     ///
-    /// It takes the entry of another patch in an eighth of cases only: where there are more of them than entries, none would keep its own.
+    /// It takes the entry of another patch in an eighth of cases only: where there are more of them than entries, none
+    /// would keep its own.
     #[cold]
     #[inline(never)]
     fn ask(&self, ray: &LatticeRay, left: &mut Left<'_, '_, '_, '_>) -> bool {

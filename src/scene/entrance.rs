@@ -29,7 +29,8 @@ impl Entrance {
     pub fn ray<K: Kernel>(&self, k: K, ray: &Ray) -> [K::D; 2] {
         let [x, y, z, translation] = &self.columns;
         let (x, y, z) = (k.load4(x), k.load4(y), k.load4(z));
-        // Components one by one: whoever made the ray has just written them one by one, and a wider load would wait for that.
+        // Components one by one: whoever made the ray has just written them one by one, and a wider load would wait for
+        // that.
         let origin = k.add4(turned(k, [x, y, z], ray.origin), k.load4(translation));
         [origin, turned(k, [x, y, z], ray.direction)]
     }

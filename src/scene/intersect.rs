@@ -4,8 +4,8 @@
 //! 8 x 8 cells, else a node whose children are nodes or pieces in their turn. A block that is missing is built on the
 //! spot, so nothing is tessellated but what a ray reaches.
 //!
-//! `entrance.rs` takes a ray into a mesh's lattice, `aim.rs` and `accel` to its patches, `departure.rs` past the one that it leaves,
-//! `patch_walk.rs` through a patch; `builder.rs` builds what is missing.
+//! `entrance.rs` takes a ray into a mesh's lattice, `aim.rs` and `accel` to its patches, `departure.rs` past the one
+//! that it leaves, `patch_walk.rs` through a patch; `builder.rs` builds what is missing.
 
 use super::accel::{LeafWalk, TraversalStack};
 use super::aim::{Aim, TakeAim};
@@ -24,7 +24,8 @@ use glam::DVec3;
 
 /// One thread's access to the scene's geometry.
 ///
-/// Rays that are near each other need the same blocks. Where the caller has many rays in no such order, a batch finds one:
+/// Rays that are near each other need the same blocks. Where the caller has many rays in no such order, a batch finds
+/// one:
 ///
 /// ```
 /// use glam::{DAffine3, DVec3};
@@ -298,7 +299,8 @@ impl<'w> Intersector<'w> {
         }
     }
 
-    /// The limit surface's normal at a hit, in object space, along du x dv and not normalised; zero where there is none.
+    /// The limit surface's normal at a hit, in object space, along du x dv and not normalised; zero where there is
+    /// none.
     pub fn limit_normal(&mut self, hit: &Hit) -> DVec3 {
         let surface = self.world.mesh(hit.primitive.mesh).surface();
         self.shading.normal(surface, hit.primitive.patch, f64::from(hit.u), f64::from(hit.v))
@@ -351,7 +353,8 @@ impl<'w> Intersector<'w> {
         hit
     }
 
-    /// The ray in the space of the tree over meshes; its `t` is only good for the order of visits, and ends a little later.
+    /// The ray in the space of the tree over meshes; its `t` is only good for the order of visits, and ends a little
+    /// later.
     fn scene_ray(&self, ray: &Ray) -> LatticeRay {
         let to = self.world.scene_from_world();
         let (origin, direction) = (to.transform_point3(ray.origin), to.transform_vector3(ray.direction));

@@ -24,7 +24,8 @@ impl Light {
         }
     }
 
-    /// Light that arrives at `position`. `None` for a sky, which comes from everywhere, and at the place of a point light.
+    /// Light that arrives at `position`. `None` for a sky, which comes from everywhere, and at the place of a point
+    /// light.
     pub fn incident(&self, position: DVec3) -> Option<Incident> {
         match *self {
             Self::Point { position: light, intensity } => {

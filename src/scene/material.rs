@@ -5,7 +5,8 @@ use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 
 impl Albedo {
-    /// The cube of a checker that a point of world space lies in, by its lowest corner in cubes; zero where there is one colour.
+    /// The cube of a checker that a point of world space lies in, by its lowest corner in cubes; zero where there is
+    /// one colour.
     pub fn cube_at(&self, position: DVec3) -> DVec3 {
         match *self {
             Self::Constant(_) => DVec3::ZERO,

@@ -1,8 +1,8 @@
 //! A ray's way through one patch: from its first block down the nodes to pieces, each block built when it is missing.
 //!
-//! A node is left for its children in a function of its own only if they are nodes in their turn, which takes a rate above 32,
-//! or had to be built just now. So blocks that are there stay in registers, and nothing waits for a structure that was put
-//! into memory a moment ago.
+//! A node is left for its children in a function of its own only if they are nodes in their turn, which takes a rate
+//! above 32, or had to be built just now. So blocks that are there stay in registers, and nothing waits for a structure
+//! that was put into memory a moment ago.
 
 use super::builder::{Builder, NODE_SIDE, PatchContext, child_cells, child_side};
 use crate::cache::{Block, Visit};
@@ -30,7 +30,8 @@ impl<'v> InPatch<'_, 'v, '_> {
         }
     }
 
-    /// Builds a child's block. (The slot is made anew: handed over, it would be written to memory for blocks that are there, too.)
+    /// Builds a child's block. (The slot is made anew: handed over, it would be written to memory for blocks that are
+    /// there, too.)
     #[cold]
     #[inline(never)]
     fn build_child(self, builder: &mut Builder<'_>, lane: usize) -> Self {

@@ -1,4 +1,5 @@
-//! All pieces of a patch, those that are not in the cache diced and forgotten: for what is found out once and remembered.
+//! All pieces of a patch, those that are not in the cache diced and forgotten: for what is found out once and
+//! remembered.
 
 use super::builder::{Builder, NODE_SIDE, PatchContext, child_cells, child_side, is_piece};
 use crate::cache::{Block, Visit};
@@ -38,7 +39,8 @@ struct Pieces<'r, 'a, 'p> {
 }
 
 impl<'r> Pieces<'r, '_, '_> {
-    /// Collects the pieces over these cells; `block` is what is in the cache over them. Those that are not there are made in the places.
+    /// Collects the pieces over these cells; `block` is what is in the cache over them. Those that are not there are
+    /// made in the places.
     fn collect(
         &mut self,
         block: Option<Block<'r>>,

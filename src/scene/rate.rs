@@ -22,8 +22,8 @@ pub enum DicingRate {
         /// Pieces of length 1 at distance 1 from the eye are this many target lengths long.
         pieces_per_unit: f64,
     },
-    /// Every edge has its own rate, drawn with this seed from 1..=1000, with as many in 1..2 as in 2..4, 4..8 and so on:
-    /// the hardest neighbours for tests.
+    /// Every edge has its own rate, drawn with this seed from 1..=1000, with as many in 1..2 as in 2..4, 4..8 and so
+    /// on: the hardest neighbours for tests.
     Random(u64),
 }
 
@@ -38,7 +38,8 @@ impl DicingRate {
         }
     }
 
-    /// Number of pieces, 1..=4096, of an edge between `a` and `b` in world space. The order of `a` and `b` does not matter.
+    /// Number of pieces, 1..=4096, of an edge between `a` and `b` in world space. The order of `a` and `b` does not
+    /// matter.
     ///
     /// The length in pixels is what the edge would cover if it faced the camera at the distance of its nearest point.
     /// So foreshortened edges are not starved (a silhouette is foreshortened), no piece is longer on the screen than

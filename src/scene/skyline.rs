@@ -1,4 +1,5 @@
-//! The skyline of a patch: of what is near all pieces are looked at, what is far is seen as the boxes of the tree over patches.
+//! The skyline of a patch: of what is near all pieces are looked at, what is far is seen as the boxes of the tree over
+//! patches.
 
 use super::accel::LeafRef;
 use super::builder::{Builder, PatchContext};
@@ -14,12 +15,13 @@ const MOST_NEAR: usize = 64;
 /// Pieces of each of them that are looked at, at most: a larger one is seen as its box.
 const MOST_PIECES: usize = 64;
 
-/// What is so far from a patch, as a share of the box around it, is near. Of bigguy's rays at 8 that were asked about, 0.50, 0.58 and 0.63 cleared their skylines with a quarter, a half
-/// and the whole, of monsterfrog's 0.40, 0.50 and 0.43 (where more than [`MOST_NEAR`] are near).
+/// What is so far from a patch, as a share of the box around it, is near. Of bigguy's rays at 8 that were asked about,
+/// 0.50, 0.58 and 0.63 cleared their skylines with a quarter, a half and the whole, of monsterfrog's 0.40, 0.50 and
+/// 0.43 (where more than [`MOST_NEAR`] are near).
 const NEAR: f32 = 0.5;
 
-/// A box of several patches is seen as one if it raises the skyline by less than this many of its units. With 4, 16 and 32 of them trex's rays clear 0.60, 0.58 and 0.52, and a skyline
-/// takes 90, 83 and 74 µs.
+/// A box of several patches is seen as one if it raises the skyline by less than this many of its units. With 4, 16 and
+/// 32 of them trex's rays clear 0.60, 0.58 and 0.52, and a skyline takes 90, 83 and 74 µs.
 const LEAST_GAIN: f32 = 16.0;
 
 /// Boxes that are opened, at most.

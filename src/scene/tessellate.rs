@@ -60,7 +60,8 @@ impl PatchGrid {
     }
 }
 
-/// The triangles of a whole grid as vertex indices: both halves of cell (0,0), then (1,0), and so on, those in holes too.
+/// The triangles of a whole grid as vertex indices: both halves of cell (0,0), then (1,0), and so on, those in holes
+/// too.
 pub fn triangles(rates: &PatchRates) -> impl Iterator<Item = [usize; 3]> {
     let (n_u, n_v) = (rates.n_u as usize, rates.n_v as usize);
     (0..n_v).flat_map(move |j| {

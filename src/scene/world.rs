@@ -82,8 +82,8 @@ pub struct WorldMesh {
 pub struct Watch<'a> {
     /// Is told which share of the work is done, now and then, from any thread.
     pub progress: &'a (dyn Fn(f64) + Sync),
-    /// Is told which share of the plans is made, now and then, and ends the work by an error: how much memory plans take cannot
-    /// be told before.
+    /// Is told which share of the plans is made, now and then, and ends the work by an error: how much memory plans
+    /// take cannot be told before.
     pub planned: &'a dyn Fn(f64) -> Result<()>,
 }
 
@@ -101,8 +101,8 @@ pub struct FullTessellation {
 }
 
 impl FullTessellation {
-    /// More bytes than all of it can take: pieces may need a third more than the middle vertex format, and segments are not
-    /// filled to the last byte.
+    /// More bytes than all of it can take: pieces may need a third more than the middle vertex format, and segments are
+    /// not filled to the last byte.
     pub fn most_bytes(&self) -> usize {
         2 * self.bytes as usize + (64 << 20)
     }
@@ -186,8 +186,8 @@ fn scene_box(scene_from_world: DAffine3, b: DBounds) -> Bounds {
     Bounds { min: (min - 1.0).floor().as_vec3(), max: (max + 1.0).ceil().as_vec3() }
 }
 
-/// Whether the map is one scale for all directions and a turn, mirrored or not, but for so little that what is normal to a
-/// triangle in one space is so in the other within the margins of horizons and skylines.
+/// Whether the map is one scale for all directions and a turn, mirrored or not, but for so little that what is normal
+/// to a triangle in one space is so in the other within the margins of horizons and skylines.
 fn keeps_angles(map: &DMat3) -> bool {
     let gram = map.transpose() * *map;
     let scale = (gram.x_axis.x + gram.y_axis.y + gram.z_axis.z) / 3.0;
@@ -537,7 +537,8 @@ impl GridCache {
         world.meshes.iter().map(|m| m.top.n_slots()).map(|n| 8 * n + 8 * n.div_ceil(64)).sum()
     }
 
-    /// Bytes of what all threads remember of patches that rays leave, for so many patches in all, hidden ones included: some
+    /// Bytes of what all threads remember of patches that rays leave, for so many patches in all, hidden ones included:
+    /// some
     /// 4.5 MiB at most.
     pub fn departure_bytes_for(n_patches: usize) -> usize {
         Departures::bytes_for(n_patches)

@@ -16,8 +16,8 @@ const WHOLE: [[f64; 2]; 2] = [[0.0, 1.0]; 2];
 /// Weights of the last ranges along u and along v.
 pub(super) type HullWeights = [RangeWeights; 2];
 
-/// Ranges that are remembered, by their ends in quarters: the whole, its halves and its quarters have places of their own,
-/// but for one.
+/// Ranges that are remembered, by their ends in quarters: the whole, its halves and its quarters have places of their
+/// own, but for one.
 const N_RANGES: usize = 8;
 
 /// Weights of the last parameter ranges: the parts of a patch have ranges in common, and most patches the same ones.
@@ -46,8 +46,8 @@ impl RangeWeights {
 }
 
 impl Evaluator {
-    /// A box that holds the part `[u0,u1] x [v0,v1]` of the patch: the Bézier hulls of its regular parts, and ring hulls
-    /// `depth` splits below the patch, or where the surface is known to lie in them.
+    /// A box that holds the part `[u0,u1] x [v0,v1]` of the patch: the Bézier hulls of its regular parts, and ring
+    /// hulls `depth` splits below the patch, or where the surface is known to lie in them.
     pub(super) fn parts_bounds(
         &mut self,
         library: &PlanLibrary,
@@ -169,8 +169,9 @@ impl Evaluator {
 pub(super) type GridBoxes = [[Point; 2]; MOST_PARTS * MOST_PARTS];
 
 impl Evaluator {
-    /// The boxes of `side` x `side` equal parts (1, 2 or 4) of the part `[u0,u1] x [v0,v1]` of an irregular patch, which is
-    /// the patch or a quarter of a quarter and so on; `depth` is as for each box alone. Returns whether it could be done.
+    /// The boxes of `side` x `side` equal parts (1, 2 or 4) of the part `[u0,u1] x [v0,v1]` of an irregular patch,
+    /// which is the patch or a quarter of a quarter and so on; `depth` is as for each box alone. Returns whether it
+    /// could be done.
     pub(super) fn grid_of_parts(
         &mut self,
         library: &PlanLibrary,

@@ -1,14 +1,14 @@
 //! From patches to lattice vertices: rates, shared borders, and boxes of parts that are not tessellated yet.
 //!
-//! The **rate** of an edge is the number of segments it is cut into; it belongs to the edge, so both faces agree. A patch
-//! has `n_u x n_v` cells, the larger of opposite rates; where a side is coarser than that, its border vertices snap to the
-//! nearest of the edge's points, and the border becomes the edge's own polyline.
+//! The **rate** of an edge is the number of segments it is cut into; it belongs to the edge, so both faces agree. A
+//! patch has `n_u x n_v` cells, the larger of opposite rates; where a side is coarser than that, its border vertices
+//! snap to the nearest of the edge's points, and the border becomes the edge's own polyline.
 //!
-//! Neighbours evaluate a shared point from different rings, and their f64 results differ in the last bits. Both round to
-//! the lattice. Only where a coordinate is within [`GUARD`] of a rounding boundary could they disagree, and there both ask
-//! the same **owner** (of the edge or vertex) and take its rounded value. If one side sees the point inside the guard and
-//! the other just outside, they still agree: the owner's value lies within the evaluation error, far less than the
-//! guard, of one that is a whole guard away from the boundary.
+//! Neighbours evaluate a shared point from different rings, and their f64 results differ in the last bits. Both round
+//! to the lattice. Only where a coordinate is within [`GUARD`] of a rounding boundary could they disagree, and there
+//! both ask the same **owner** (of the edge or vertex) and take its rounded value. If one side sees the point inside
+//! the guard and the other just outside, they still agree: the owner's value lies within the evaluation error, far less
+//! than the guard, of one that is a whole guard away from the boundary.
 
 use super::eval::{Evaluator, Point, SurfaceSample};
 use super::regular::MOST_PARTS;
@@ -22,13 +22,13 @@ use glam::{DVec3, Vec3};
 
 /// Distance from a rounding boundary, in lattice steps, within which border points are computed by their owner.
 ///
-/// Evaluation errors stay below 2^-21: coordinates are below 2^23, so that one f64 operation errs by at most 2^-30, and a
-/// walk of 30 levels sums about 20 terms each. The fuzz tests measure less than 2^-24. Larger guards cost owner
+/// Evaluation errors stay below 2^-21: coordinates are below 2^23, so that one f64 operation errs by at most 2^-30, and
+/// a walk of 30 levels sums about 20 terms each. The fuzz tests measure less than 2^-24. Larger guards cost owner
 /// evaluations (6 GUARD of all border points), smaller ones lose the margin.
 pub const GUARD: f64 = 1.0 / 65536.0;
 
-/// Added before rounding: mesh coordinates are often dyadic fractions, whose halves would lie on rounding boundaries all
-/// the time; a third is far from all of them.
+/// Added before rounding: mesh coordinates are often dyadic fractions, whose halves would lie on rounding boundaries
+/// all the time; a third is far from all of them.
 pub const LATTICE_SHIFT: f64 = 1.0 / 3.0;
 
 const ROUNDING: Rounding = Rounding { shift: LATTICE_SHIFT, guard: GUARD };
@@ -66,8 +66,9 @@ impl PatchRates {
 }
 
 impl Surface {
-    /// The rates of a patch, from `rate(a, b)`: the segments for an edge between two points of object space, symmetric in
-    /// them. Edges beside a polygon that is no quad are cut evenly, since the polygon's patches meet in their middle.
+    /// The rates of a patch, from `rate(a, b)`: the segments for an edge between two points of object space, symmetric
+    /// in them. Edges beside a polygon that is no quad are cut evenly, since the polygon's patches meet in their
+    /// middle.
     pub fn patch_rates(&self, patch: PatchId, rate: &impl Fn(DVec3, DVec3) -> u32) -> PatchRates {
         let end = |h: u32| self.object_point(self.topology().vertex(h));
         self.rates_by(patch, &|h| rate(end(h), end(self.topology().next(h))), &|face, k| {
@@ -84,8 +85,8 @@ impl Surface {
         self.rates_by(patch, &|_| n, &|_, _| n)
     }
 
-    /// The rates of a patch from those of half-edges, and of twice the way from the middle of edge k of a polygon to its
-    /// centre.
+    /// The rates of a patch from those of half-edges, and of twice the way from the middle of edge k of a polygon to
+    /// its centre.
     fn rates_by(&self, patch: PatchId, edge: &impl Fn(u32) -> u32, inner: &impl Fn(FaceId, u32) -> u32) -> PatchRates {
         let (face, sub) = self.face_of(patch);
         let (first, n) = self.topology().face_corners(face.0);
@@ -127,8 +128,8 @@ impl Surface {
     }
 }
 
-/// Patches whose ring points a dicer remembers, one for each remainder of patch numbers: rays come back to the few patches
-/// around them.
+/// Patches whose ring points a dicer remembers, one for each remainder of patch numbers: rays come back to the few
+/// patches around them.
 const N_REMEMBERED: usize = 16;
 
 /// Turns parts of patches into lattice vertices. Holds scratch memory and the last patches: keep one per thread.
@@ -191,7 +192,8 @@ pub fn snapped(i: u32, n: u32, rate: u32) -> u32 {
     ((2 * u64::from(i) * u64::from(rate) + u64::from(n)) / (2 * u64::from(n))) as u32
 }
 
-/// `i / n` for all i from the first to the last. Dividing by a power of two is multiplying, which takes a quarter of the time.
+/// `i / n` for all i from the first to the last. Dividing by a power of two is multiplying, which takes a quarter of
+/// the time.
 fn parameters([first, last]: [u32; 2], n: u32) -> impl Iterator<Item = f64> {
     let is_exact = n.is_power_of_two();
     let (n, step) = (f64::from(n), 1.0 / f64::from(n));
@@ -220,7 +222,8 @@ impl Dicer {
         }
     }
 
-    /// Makes the vertices of a side what both of its patches agree on, if the part `cells` (along u and v) touches that side.
+    /// Makes the vertices of a side what both of its patches agree on, if the part `cells` (along u and v) touches that
+    /// side.
     fn settle_side(
         &mut self,
         surface: &Surface,
@@ -312,8 +315,8 @@ impl Dicer {
         surface.normal(&mut self.points[lane], &mut self.evaluator, u, v)
     }
 
-    /// A box that holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing; `depth` more
-    /// splits towards irregular corners make it tighter.
+    /// A box that holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing; `depth`
+    /// more splits towards irregular corners make it tighter.
     pub fn bounds(
         &mut self,
         surface: &Surface,
@@ -353,9 +356,9 @@ impl Dicer {
         to_lattice_box(bounds.min, bounds.max)
     }
 
-    /// Appends the [`bounds`](Self::bounds) of `n[0]` x `n[1]` parts of `side` x `side` cells from (`from[0]`, `from[1]`) on, if
-    /// they can be found together: where a square of two or four parts a side has no side that is coarser than its cells.
-    /// Returns whether that is so.
+    /// Appends the [`bounds`](Self::bounds) of `n[0]` x `n[1]` parts of `side` x `side` cells from (`from[0]`,
+    /// `from[1]`) on, if they can be found together: where a square of two or four parts a side has no side that is
+    /// coarser than its cells. Returns whether that is so.
     #[allow(clippy::too_many_arguments)]
     pub fn bounds_of_parts(
         &mut self,
@@ -465,7 +468,8 @@ impl OwnerScratch {
         }
     }
 
-    /// Point `index` of `rate` from the middle of a polygon's edge `k`, itself cut into `2 half` segments, to its centre.
+    /// Point `index` of `rate` from the middle of a polygon's edge `k`, itself cut into `2 half` segments, to its
+    /// centre.
     fn inner_point(&mut self, surface: &Surface, face: FaceId, k: u32, index: u32, rate: u32, half: u32) -> [i32; 3] {
         let (first, _) = surface.topology().face_corners(face.0);
         if index == 0 {

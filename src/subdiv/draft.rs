@@ -1,6 +1,7 @@
 //! What can be told of a ring's node before it is among others: its rows, its limits, and the keys of its quarters.
 //!
-//! Making this is most of the work of making a node and needs no library, so that it can be done for many rings at once.
+//! Making this is most of the work of making a node and needs no library, so that it can be done for many rings at
+//! once.
 
 use super::local::{LocalMesh, RingWalker};
 use super::pole::Pole;
@@ -31,7 +32,8 @@ pub(super) struct SplitDraft {
 
 /// A quarter that will be a child.
 pub(super) struct Quarter {
-    /// The key of its ring, made less sharp; shared with the quarter before if they are equal, as those of a polygon are.
+    /// The key of its ring, made less sharp; shared with the quarter before if they are equal, as those of a polygon
+    /// are.
     pub key: Arc<[u32]>,
     /// The half-edge of the refined ring where its own starts.
     pub start: u32,

@@ -137,8 +137,8 @@ pub(super) fn quarter(k: usize) -> (f64, f64) {
     [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][k]
 }
 
-/// The quarters of a quad in an order in which the left one of two neighbours comes first: writing a row's points, four at
-/// a time, may spoil what is to the right of them.
+/// The quarters of a quad in an order in which the left one of two neighbours comes first: writing a row's points, four
+/// at a time, may spoil what is to the right of them.
 pub(super) const LEFT_FIRST: [usize; 4] = [0, 1, 3, 2];
 
 /// How many halvings of a patch with so many cells lead to parts that stencils are for.
@@ -158,8 +158,8 @@ fn exact_corner(u: f64, v: f64) -> Option<usize> {
 }
 
 impl Evaluator {
-    /// Positions at all pairs of `us` and `vs` (each ascending, in 0..=1) of an irregular patch; point (i, j) of `out` is at `(us[i], vs[j])`.
-    /// They may be any, or some of those of a grid with `cells` along u and v.
+    /// Positions at all pairs of `us` and `vs` (each ascending, in 0..=1) of an irregular patch; point (i, j) of `out`
+    /// is at `(us[i], vs[j])`. They may be any, or some of those of a grid with `cells` along u and v.
     pub(super) fn grid(
         &mut self,
         library: &PlanLibrary,
@@ -328,8 +328,8 @@ impl Evaluator {
         true
     }
 
-    /// Corners whose limit is known here, in place of what deeper parts made of them: a point alone comes no further than
-    /// this, and must not depend on its company.
+    /// Corners whose limit is known here, in place of what deeper parts made of them: a point alone comes no further
+    /// than this, and must not depend on its company.
     fn set_corners(
         &self,
         library: &PlanLibrary,
@@ -434,7 +434,8 @@ impl Evaluator {
         simd::run(regular::Positions { control, u, v, out, first: target.first });
     }
 
-    /// Position and tangents at one point of a patch whose parts are kept: the same, to the bit, as if they were found anew.
+    /// Position and tangents at one point of a patch whose parts are kept: the same, to the bit, as if they were found
+    /// anew.
     pub(super) fn sample_parts(
         &mut self,
         library: &PlanLibrary,
@@ -513,7 +514,8 @@ impl Evaluator {
         }
     }
 
-    /// The ring points of a child of a polygon, in place of what was in `out`; `points` are those of [`Self::refine_polygon`].
+    /// The ring points of a child of a polygon, in place of what was in `out`; `points` are those of
+    /// [`Self::refine_polygon`].
     pub fn child_ring(library: &PlanLibrary, node: NodeId, points: &[Point], k: usize, out: &mut Vec<Point>) -> NodeId {
         let child = polygon(library, node).1.get(k);
         let refined = &points[library.n_points(node)..];

@@ -1,13 +1,13 @@
 //! The faces around the corners of a quad: what tells most irregular rings from others, without finding them.
 //!
-//! A **fan** is the sizes of the faces around a vertex, as seen from one of them. Where the fans of a quad are closed, without
-//! tags, and touch each other only where they must, they decide its ring.
+//! A **fan** is the sizes of the faces around a vertex, as seen from one of them. Where the fans of a quad are closed,
+//! without tags, and touch each other only where they must, they decide its ring.
 
 use super::numbering::Numbering;
 use crate::topology::{HalfEdges, NONE, Topology};
 
-/// The sizes of the faces around a corner but the corner's own, counter-clockwise: 3 less in two bits each, below a bit that
-/// is set.
+/// The sizes of the faces around a corner but the corner's own, counter-clockwise: 3 less in two bits each, below a bit
+/// that is set.
 pub(super) type Fan = u64;
 
 /// The fan of four quads.
@@ -20,7 +20,8 @@ const MOST_FACES: u32 = 31;
 /// The fans of a mesh.
 pub(super) struct Fans<'a> {
     topology: &'a Topology,
-    /// The numbers of edges at vertices that have quads only around them and no tag, from 3 to [`MOST_FACES`]; 0 for others.
+    /// The numbers of edges at vertices that have quads only around them and no tag, from 3 to [`MOST_FACES`]; 0 for
+    /// others.
     valences: Vec<u8>,
 }
 
@@ -95,14 +96,16 @@ fn turned(topology: &Topology, spoke: u32) -> u32 {
     topology.twin(topology.prev(spoke))
 }
 
-/// Whether all vertices of the ring of a quad with [`Fans`] are different ones, but for those that faces side by side share.
+/// Whether all vertices of the ring of a quad with [`Fans`] are different ones, but for those that faces side by side
+/// share.
 pub(super) fn is_spread_out(topology: &Topology, first: u32, vertices: &mut Numbering) -> bool {
     vertices.clear();
     let mut is_new = |h: u32| vertices.number(topology.vertex(h)).1;
     (first..first + 4).all(|h| {
         let beside = turned(topology, h);
-        // The two faces beside the edges of the quad have vertices in common with the fans of the next corners: of each, the
-        // end of the edge from the corner is counted where that follows counter-clockwise, and in a triangle there only.
+        // The two faces beside the edges of the quad have vertices in common with the fans of the next corners: of
+        // each, the end of the edge from the corner is counted where that follows counter-clockwise, and in a triangle
+        // there only.
         let mut is_counted = topology.corners_at(beside).1 == 3;
         let mut spoke = turned(topology, beside);
         let mut are_new = is_new(h);

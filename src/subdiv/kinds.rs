@@ -50,7 +50,8 @@ enum Ring<'a> {
     Key(&'a [u32]),
 }
 
-/// Faces that follow each other. Of those that have one, the kind is in the place of the plan, as a node's number would be.
+/// Faces that follow each other. Of those that have one, the kind is in the place of the plan, as a node's number would
+/// be.
 struct Task<'a> {
     first: usize,
     plans: &'a mut [NodeId],
@@ -168,8 +169,8 @@ fn joined(of_threads: &[Kinds]) -> (Vec<Vec<usize>>, Vec<u32>) {
     (numbers, examples)
 }
 
-/// The nodes of the rings that start at these half-edges. One thread puts drafts into the library, in their order; the others
-/// make them, and it helps while the next one is not there.
+/// The nodes of the rings that start at these half-edges. One thread puts drafts into the library, in their order; the
+/// others make them, and it helps while the next one is not there.
 fn plan_batch(topology: &Topology, library: &mut PlanLibrary, starts: &[u32], n_threads: usize) -> Vec<NodeId> {
     let drafts = Drafts::new(topology, library.rules(), starts);
     let n_helpers = n_threads.min(starts.len().div_ceil(LEAST_KINDS)).saturating_sub(1);
@@ -212,7 +213,8 @@ impl<'a> Drafts<'a> {
         Self { topology, rules, starts, made, next: AtomicUsize::new(0) }
     }
 
-    /// Makes the next draft; returns whether there was one to make. The walkers are scratch, for the ring and its quarters.
+    /// Makes the next draft; returns whether there was one to make. The walkers are scratch, for the ring and its
+    /// quarters.
     fn make_next(&self, [walker, of_quarters]: &mut [RingWalker; 2]) -> bool {
         let i = self.next.fetch_add(1, Ordering::Relaxed);
         let Some(&start) = self.starts.get(i) else { return false };

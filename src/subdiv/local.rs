@@ -21,8 +21,8 @@ pub struct LocalMesh {
     pub sharpness: Vec<f32>,
     /// Tags per vertex; only those of the target's corners are complete, others are read for their semi-sharp edges.
     pub tags: Vec<VertexTags>,
-    /// Corners of the target that are inner vertices of fins, with the ends of their two sharp edges. Such an end may be
-    /// a vertex without any half-edge here.
+    /// Corners of the target that are inner vertices of fins, with the ends of their two sharp edges. Such an end may
+    /// be a vertex without any half-edge here.
     pub fins: Vec<(u32, [u32; 2])>,
 }
 
@@ -121,8 +121,8 @@ impl LocalMesh {
         tags.chain(&self.sharpness).filter(|s| is_semi_sharp(**s)).fold(f32::INFINITY, |least, s| least.min(*s))
     }
 
-    /// Makes all that is semi-sharp less so, by as many steps of the uniform method as leave the least of it above 1. Returns
-    /// how many. Exact, as the steps themselves are.
+    /// Makes all that is semi-sharp less so, by as many steps of the uniform method as leave the least of it above 1.
+    /// Returns how many. Exact, as the steps themselves are.
     pub fn lower(&mut self) -> u32 {
         let least = self.least_semi_sharp();
         let steps = if least.is_finite() { (least.ceil() - 2.0).max(0.0) } else { 0.0 };
@@ -196,8 +196,8 @@ const PLAIN: u32 = 1 << 31;
 const ALL_QUADS: u32 = 1 << 30;
 
 impl LocalMesh {
-    /// As [`key`](Self::key), where all corners of the target are plain: edges at them are sound, so that their twins follow
-    /// from the vertices, no others count, and nothing is sharp.
+    /// As [`key`](Self::key), where all corners of the target are plain: edges at them are sound, so that their twins
+    /// follow from the vertices, no others count, and nothing is sharp.
     fn plain_key(&self, key: &mut Vec<u32>) {
         if self.all_quads() {
             key.push(self.n_faces() as u32 | PLAIN | ALL_QUADS);
@@ -222,9 +222,9 @@ pub fn extract<M: HalfEdges + ?Sized>(mesh: &M, first: u32, outer_tags: bool) ->
     walker.ring
 }
 
-/// As [`extract`], with all faces at the target's corners, whatever sharp or non-manifold edges lie between: edits can reach
-/// across those. `spokes` lists the half-edges that start at a vertex. Faces but the target start as they do in `mesh`, so
-/// that of a face's passages of an edge the first stays the first.
+/// As [`extract`], with all faces at the target's corners, whatever sharp or non-manifold edges lie between: edits can
+/// reach across those. `spokes` lists the half-edges that start at a vertex. Faces but the target start as they do in
+/// `mesh`, so that of a face's passages of an edge the first stays the first.
 pub fn extract_whole<M: HalfEdges + ?Sized>(
     mesh: &M,
     first: u32,
@@ -269,7 +269,8 @@ fn fraction_bits(sharpness: f32) -> u32 {
 }
 
 impl CornerSign {
-    /// A face in the order of the fan: its number of corners, whether it lies clockwise, and the sharpness of the edge to it.
+    /// A face in the order of the fan: its number of corners, whether it lies clockwise, and the sharpness of the edge
+    /// to it.
     #[inline(always)]
     fn add_face(&mut self, size: u32, is_clockwise: bool, sharpness: f32) {
         self.n_faces += 1;
@@ -292,8 +293,8 @@ impl CornerSign {
     }
 }
 
-/// The turn of four corners that comes first in the order of their signs: of layouts first, so that rings that differ in
-/// sharpness only are turned alike and have rows in common.
+/// The turn of four corners that comes first in the order of their signs: of layouts first, so that rings that differ
+/// in sharpness only are turned alike and have rows in common.
 fn least_turn(signs: &[CornerSign]) -> u32 {
     let turned = |t: usize| {
         let corners = [0, 1, 2, 3].map(|k| signs[(t + k) % 4]);
@@ -302,8 +303,8 @@ fn least_turn(signs: &[CornerSign]) -> u32 {
     (1..4).fold(0, |best, t| if turned(t) < turned(best) { t } else { best }) as u32
 }
 
-/// The turn of a quad without tags at its corners, as its [`Look`] tells unless it is regular: from the sizes of the faces
-/// around each corner but itself, counter-clockwise.
+/// The turn of a quad without tags at its corners, as its [`Look`] tells unless it is regular: from the sizes of the
+/// faces around each corner but itself, counter-clockwise.
 pub(super) fn turn_of_fans(fans: [impl Iterator<Item = u32>; 4]) -> u32 {
     least_turn(&fans.map(|sizes| {
         let mut sign = CornerSign::default();
@@ -315,8 +316,8 @@ pub(super) fn turn_of_fans(fans: [impl Iterator<Item = u32>; 4]) -> u32 {
 /// A face seen by what lies around its corners.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
-    /// From which corner on its ring is the same however the face is turned. Rings that may be regular, and those of polygons,
-    /// are not turned.
+    /// From which corner on its ring is the same however the face is turned. Rings that may be regular, and those of
+    /// polygons, are not turned.
     pub turn: u32,
     /// Whether all corners are plain, as [`HalfEdges::is_plain`] has it.
     pub is_plain: bool,
@@ -337,8 +338,8 @@ pub struct RingWalker {
 }
 
 impl RingWalker {
-    /// The sources that [`extract`] gives for the face of `first`, without the ring: what loading a patch needs, again and
-    /// again.
+    /// The sources that [`extract`] gives for the face of `first`, without the ring: what loading a patch needs, again
+    /// and again.
     pub fn sources<M: HalfEdges + ?Sized>(&mut self, mesh: &M, first: u32) -> &[u32] {
         let n_corners = self.walk(mesh, first);
         self.add_vertices::<M, false>(mesh, n_corners);
@@ -353,8 +354,8 @@ impl RingWalker {
         &self.ring
     }
 
-    /// The key of the ring from `first` on, whose corners are as `look` says, and its sources. If it `lowers`, the key is that of
-    /// the ring that is [lower](LocalMesh::lower) by the steps that are returned.
+    /// The key of the ring from `first` on, whose corners are as `look` says, and its sources. If it `lowers`, the key
+    /// is that of the ring that is [lower](LocalMesh::lower) by the steps that are returned.
     pub fn key<M: HalfEdges + ?Sized>(
         &mut self,
         mesh: &M,
@@ -437,8 +438,8 @@ impl RingWalker {
         }
     }
 
-    /// Adds the faces around a corner of the target, counter-clockwise, then what lies clockwise of it: an order that only
-    /// topology decides.
+    /// Adds the faces around a corner of the target, counter-clockwise, then what lies clockwise of it: an order that
+    /// only topology decides.
     #[inline(always)]
     fn add_fan<M: HalfEdges + ?Sized>(&mut self, mesh: &M, h: u32, is_border: impl Fn(u32) -> bool) {
         let mut spoke = h;
@@ -460,8 +461,8 @@ impl RingWalker {
         }
     }
 
-    /// Adds the vertices of all faces, then the ends of fins at corners. Unless `LISTED`, that is all; else the vertex and
-    /// the face of each half-edge are written down.
+    /// Adds the vertices of all faces, then the ends of fins at corners. Unless `LISTED`, that is all; else the vertex
+    /// and the face of each half-edge are written down.
     fn add_vertices<M: HalfEdges + ?Sized, const LISTED: bool>(&mut self, mesh: &M, n_corners: u32) {
         let ring = &mut self.ring.mesh;
         if LISTED {
@@ -550,8 +551,8 @@ impl RingWalker {
     }
 }
 
-/// What the faces around a corner add to its sign, up to borders, in the order in which [`RingWalker`] adds them; returns
-/// whether they close around it. `sharpness` is that of an edge between two of them.
+/// What the faces around a corner add to its sign, up to borders, in the order in which [`RingWalker`] adds them;
+/// returns whether they close around it. `sharpness` is that of an edge between two of them.
 #[inline(always)]
 fn sign_fan<M: HalfEdges + ?Sized>(
     mesh: &M,

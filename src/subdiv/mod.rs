@@ -1,9 +1,9 @@
 //! The limit surface: from control points to positions and tangents at any (u, v) of any patch.
 //!
-//! The limit of a quad face depends only on its **ring**: the faces that touch its corners. After one Catmull-Clark step
-//! each quarter of the face has a ring of its own, whose points are weighted sums (**rows**) of the ring before. Rings
-//! with equal topology and sharpness obey the same rows, whatever mesh and level they come from, so they are stored
-//! once, as nodes of a [`PlanLibrary`]:
+//! The limit of a quad face depends only on its **ring**: the faces that touch its corners. After one Catmull-Clark
+//! step each quarter of the face has a ring of its own, whose points are weighted sums (**rows**) of the ring before.
+//! Rings with equal topology and sharpness obey the same rows, whatever mesh and level they come from, so they are
+//! stored once, as nodes of a [`PlanLibrary`]:
 //!
 //! ```text
 //!   Split ──rows──▶ 4 children ──▶ Regular (16 bicubic B-spline control points)
@@ -22,10 +22,10 @@
 //!    rounding to the lattice with that guard makes shared borders equal to the bit.
 //!
 //! Sources: Catmull & Clark 1978; Stam 1998; Nießner et al. 2012; Brainerd et al. 2016 (plans); OpenSubdiv's rules.
-//! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`dice`], [`edits`]. [`refine`] is the slow reference.
-//! What most irregular patches come to is written out: one step and boxes around a lone extraordinary vertex in `pole`, the
-//! points beside it in `stencils`. `kinds` finds the faces that share a plan, by the `fans` at their corners if it can, and has
-//! their nodes drafted (`draft`); `route` finds the vertices of a ring whose plan is known.
+//! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`dice`], [`edits`]. [`refine`] is the slow
+//! reference. What most irregular patches come to is written out: one step and boxes around a lone extraordinary vertex
+//! in `pole`, the points beside it in `stencils`. `kinds` finds the faces that share a plan, by the `fans` at their
+//! corners if it can, and has their nodes drafted (`draft`); `route` finds the vertices of a ring whose plan is known.
 
 mod bounds;
 pub mod dice;

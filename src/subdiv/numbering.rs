@@ -1,11 +1,12 @@
 //! Numbers for the vertices and faces of one ring after the other.
 
-/// Numbers for values, in the order in which they come first. It is cleared and filled again and again, so entries of its
-/// table count only with the stamp of the present filling.
+/// Numbers for values, in the order in which they come first. It is cleared and filled again and again, so entries of
+/// its table count only with the stamp of the present filling.
 #[derive(Debug, Default)]
 pub(super) struct Numbering {
     pub values: Vec<u32>,
-    /// Stamps and numbers, at the hash of the value or in the next free place; twice as many as there are values, or more.
+    /// Stamps and numbers, at the hash of the value or in the next free place; twice as many as there are values, or
+    /// more.
     table: Vec<[u32; 2]>,
     stamp: u32,
 }

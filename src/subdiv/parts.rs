@@ -1,7 +1,7 @@
 //! What is known of an irregular patch: the parts its plan has split it into so far, with their points.
 //!
-//! The boxes of a patch's node and each of its pieces walk down the same plan towards the same corner. So what one of them
-//! has found stays as long as the patch is remembered, and the next one starts from there.
+//! The boxes of a patch's node and each of its pieces walk down the same plan towards the same corner. So what one of
+//! them has found stays as long as the patch is remembered, and the next one starts from there.
 
 use super::eval::Point;
 use super::plan::{Child, NodeId, Plan, PlanLibrary};

@@ -12,14 +12,14 @@ use rustc_hash::FxHashMap;
 /// A node of the library and a turn: its number in the upper bits, and in the lower two at which corner of the face the
 /// node's corner 0 lies. So the four turns of a ring share a node. Polygons are not turned.
 ///
-/// By the uniform method all semi-sharp edges and corners lose 1 a step, and as long as they are sharper than 1, a step is
-/// the same whatever they are. So rings whose sharpness differs by whole steps share a node, made for the one that is least
-/// sharp, and the bits between tell **how many steps** sharper than that a ring is.
+/// By the uniform method all semi-sharp edges and corners lose 1 a step, and as long as they are sharper than 1, a step
+/// is the same whatever they are. So rings whose sharpness differs by whole steps share a node, made for the one that
+/// is least sharp, and the bits between tell **how many steps** sharper than that a ring is.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct NodeId(pub u32);
 
-/// Bit of a node that is shared by rings of different sharpness, and the lowest of those that count steps: fewer than 10,
-/// which is infinitely sharp.
+/// Bit of a node that is shared by rings of different sharpness, and the lowest of those that count steps: fewer than
+/// 10, which is infinitely sharp.
 const IS_SHARP: u32 = 1 << 2;
 const STEP_SHIFT: u32 = 3;
 const STEP_MASK: u32 = 15;
@@ -102,8 +102,8 @@ impl Limit {
 /// One Catmull-Clark step of a ring.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// The refined points that children use. A polygon's first row is its face point, and the others count that as one more
-    /// ring point.
+    /// The refined points that children use. A polygon's first row is its face point, and the others count that as one
+    /// more ring point.
     pub rows: SparseRows,
     /// If the ring is a pole, its points in a pole's order, and the rows are in the order of its step.
     pub pole: Option<Span>,
@@ -112,14 +112,15 @@ pub struct Step {
 /// How the surface over a ring is found.
 #[derive(Clone, Copy, Debug)]
 pub enum Plan<'a> {
-    /// Bicubic B-spline: 16 rows give the control points, u fastest, of the face from the corner that is the turn; if there
-    /// is no row, the points are the control points.
+    /// Bicubic B-spline: 16 rows give the control points, u fastest, of the face from the corner that is the turn; if
+    /// there is no row, the points are the control points.
     Regular(SparseRows, u32),
     /// One Catmull-Clark step, then the quarters (a polygon of n sides has n children).
     Split {
         /// Gives the refined points.
         step: Step,
-        /// One child per corner. Quarters of quads keep the quad's orientation; children of polygons start at their corner.
+        /// One child per corner. Quarters of quads keep the quad's orientation; children of polygons start at their
+        /// corner.
         children: Children<'a>,
         /// Limits at the corners; none for polygons, of which only the children are evaluated.
         limits: Limits<'a>,
@@ -179,7 +180,8 @@ struct Node {
     /// Where its children start, and how many there are: 0 for regular nodes, [`NONE`] as long as it is being made.
     children: u32,
     n_children: u32,
-    /// Where its children start for rings that are sharper by one step; [`NONE`], here and in `children`, as long as no ring was.
+    /// Where its children start for rings that are sharper by one step; [`NONE`], here and in `children`, as long as no
+    /// ring was.
     sharper: u32,
     /// By how many steps rings may be sharper, as bits: what is below those has been made.
     ready: u16,
@@ -341,7 +343,8 @@ impl PlanLibrary {
         self.node_above(&mut ring, steps, draft)
     }
 
-    /// The node for a ring that is so many steps sharper than this one, made if it is new. The draft is of the sharper one.
+    /// The node for a ring that is so many steps sharper than this one, made if it is new. The draft is of the sharper
+    /// one.
     fn node_above(&mut self, ring: &mut LocalMesh, steps: u32, draft: Option<Draft>) -> NodeId {
         let mut key = std::mem::take(&mut self.key);
         ring.key(&mut key);
@@ -357,8 +360,8 @@ impl PlanLibrary {
         id
     }
 
-    /// The node for a ring that is new, and its draft unless it was used. What is below it is not known yet if others can be
-    /// sharper by some steps.
+    /// The node for a ring that is new, and its draft unless it was used. What is below it is not known yet if others
+    /// can be sharper by some steps.
     fn make_node(&mut self, ring: &mut LocalMesh, key: &[u32], draft: Option<Draft>) -> (NodeId, Option<Draft>) {
         let is_sharp = self.rules.shares_sharper(ring);
         let id = NodeId(NodeId::unturned(self.nodes.len()).0 | if is_sharp { IS_SHARP } else { 0 });
@@ -396,8 +399,8 @@ impl PlanLibrary {
         self.make_children_ready(ring, &draft.quarters, &children, rings);
     }
 
-    /// Whether a node is one that rings which are as sharp can use: all below it is known. What is true of the children is true
-    /// of it.
+    /// Whether a node is one that rings which are as sharp can use: all below it is known. What is true of the children
+    /// is true of it.
     fn settle(&mut self, id: NodeId) -> bool {
         if id.0 & IS_SHARP == 0 || self.nodes[id.index()].ready >> id.steps() & 1 == 1 {
             return true;
@@ -417,7 +420,8 @@ impl PlanLibrary {
     fn make_ready(&mut self, id: NodeId, ring: &mut LocalMesh, draft: Option<Draft>) {
         let Node { children, sharper, .. } = self.nodes[id.index()];
         if id.steps() > 0 && sharper != NONE && children == NONE {
-            // The way down from here ends at the node itself, most often: then its own ring is all that has to be split.
+            // The way down from here ends at the node itself, most often: then its own ring is all that has to be
+            // split.
             self.split_sharp(id.less_sharp(id.steps()), ring, None);
             if self.settle(id) {
                 return;
@@ -427,8 +431,8 @@ impl PlanLibrary {
         self.split_sharp(id, ring, draft);
     }
 
-    /// Finds what is below a ring whose node can be that of sharper ones, too. The first of them gives the node its rows: all
-    /// have the same.
+    /// Finds what is below a ring whose node can be that of sharper ones, too. The first of them gives the node its
+    /// rows: all have the same.
     fn split_sharp(&mut self, id: NodeId, ring: &LocalMesh, draft: Option<Draft>) {
         let is_first = self.nodes[id.index()].ready == 0;
         self.nodes[id.index()].ready |= 1 << id.steps();
@@ -465,8 +469,8 @@ impl PlanLibrary {
         self.limits.extend(limits);
     }
 
-    /// The children of a ring, made if they are new, but not ready if they are shared by sharper rings; and those of their rings
-    /// that were cut out for that.
+    /// The children of a ring, made if they are new, but not ready if they are shared by sharper rings; and those of
+    /// their rings that were cut out for that.
     fn children_of(&mut self, ring: &LocalMesh, quarters: &[Quarter]) -> (Vec<Child>, Vec<Option<LocalMesh>>) {
         let mut refined = None;
         let child = |quarter: &Quarter| {
@@ -558,8 +562,8 @@ impl PlanLibrary {
         }
     }
 
-    /// A child's limit at its corner, in terms of this ring's points. Only of its position: to walk down for tangents takes
-    /// longer, but they are asked for one by one, and would be most of what libraries of semi-sharp meshes hold.
+    /// A child's limit at its corner, in terms of this ring's points. Only of its position: to walk down for tangents
+    /// takes longer, but they are asked for one by one, and would be most of what libraries of semi-sharp meshes hold.
     fn pull_back(&mut self, rows: SparseRows, child: &Child, corner: u32) -> Limit {
         if child.node.0 & IS_SHARP != 0 {
             return Limit::Regular;
@@ -584,7 +588,8 @@ impl PlanLibrary {
         self.rows.push([&row])
     }
 
-    /// The limit of corner `k` of a node whose quarter there is the node itself: the row of the corner after many steps.
+    /// The limit of corner `k` of a node whose quarter there is the node itself: the row of the corner after many
+    /// steps.
     ///
     /// The part of the row that has not converged shrinks by the subdominant eigenvalue each step, at most 0.75 for the
     /// rings that have no closed form, so that 200 steps leave less than 1e-24 of it.
@@ -606,8 +611,8 @@ impl PlanLibrary {
     }
 }
 
-/// For each control point of a face, which one it is of a node that starts at the face's corner `turn`: the node's u runs
-/// from there to the next corner.
+/// For each control point of a face, which one it is of a node that starts at the face's corner `turn`: the node's u
+/// runs from there to the next corner.
 pub(super) const TURNED_CONTROL: [[u8; 16]; 4] = [
     [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15],
     [12, 8, 4, 0, 13, 9, 5, 1, 14, 10, 6, 2, 15, 11, 7, 3],

@@ -1,8 +1,8 @@
 //! One Catmull-Clark step around a lone extraordinary vertex, written out: what most splits of irregular patches are.
 //!
-//! A **pole** is a quad with smooth corners in a ring of quads, one corner of which, the **apex**, has n != 4 edges. Its
-//! quarter at the apex is a pole of the same n, the other three are regular. As rows the step is about 150 terms, each with
-//! a column and a weight to be read; written out it is 130 sums of registers.
+//! A **pole** is a quad with smooth corners in a ring of quads, one corner of which, the **apex**, has n != 4 edges.
+//! Its quarter at the apex is a pole of the same n, the other three are regular. As rows the step is about 150 terms,
+//! each with a column and a weight to be read; written out it is 130 sums of registers.
 //!
 //! The points of a pole, for n = 5, with the face between A, e0, f0 and e1:
 //!
@@ -37,8 +37,8 @@ pub(super) struct Pole<'a> {
     spokes: Vec<u32>,
     /// Half-edges of the face, from the apex on.
     sides: [u32; 4],
-    /// Half-edges of the five faces beyond, each from the face's corner that it touches: below right, right, above right,
-    /// above, above left.
+    /// Half-edges of the five faces beyond, each from the face's corner that it touches: below right, right, above
+    /// right, above, above left.
     beyond: [u32; 5],
 }
 
@@ -217,8 +217,8 @@ pub(super) const IN_ORDER: [u8; MOST_POINTS] = {
     order
 };
 
-/// A box around a whole pole of up to [`MOST_POINTS`] points, [low, high]: after each of `depth` steps, one or more, around
-/// the Bézier points of the regular quarters, and at last around the points of what is left.
+/// A box around a whole pole of up to [`MOST_POINTS`] points, [low, high]: after each of `depth` steps, one or more,
+/// around the Bézier points of the regular quarters, and at last around the points of what is left.
 pub(super) struct PoleHull<'a, I> {
     pub points: &'a [Point],
     /// See [`PoleStep`].

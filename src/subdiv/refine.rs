@@ -1,12 +1,12 @@
 //! The slow and obvious reference: Catmull-Clark refinement as the rules are written, in double precision.
 //!
-//! A [`RefinedMesh`] holds the control mesh after some number of **steps**. [`RefinedMesh::refine`] makes one step of every
-//! face. When the **star** of a vertex (its edges and faces) has come to rest, no semi-sharp edge, no pending edit, only
-//! quads, a mask gives the vertex's point of the limit surface. [`RefinedMesh::limit_at`] gets there while refining only
-//! two rings of faces about the point, so that ten levels cost little.
+//! A [`RefinedMesh`] holds the control mesh after some number of **steps**. [`RefinedMesh::refine`] makes one step of
+//! every face. When the **star** of a vertex (its edges and faces) has come to rest, no semi-sharp edge, no pending
+//! edit, only quads, a mask gives the vertex's point of the limit surface. [`RefinedMesh::limit_at`] gets there while
+//! refining only two rings of faces about the point, so that ten levels cost little.
 //!
-//! Tests and tools compare the fast evaluation against this module. It shares no code with it, and prefers a loop over all
-//! edges to any cleverness.
+//! Tests and tools compare the fast evaluation against this module. It shares no code with it, and prefers a loop over
+//! all edges to any cleverness.
 //!
 //! ```
 //! use lazytess::{ids::FaceId, mesh::ControlMesh, subdiv::refine::RefinedMesh};
@@ -26,8 +26,8 @@
 //! 2. Decisions about boundaries and non-manifold places are made once, on the control mesh, and inherited.
 //! 3. Corners of refined faces run with the parameters: corner 0 at (i, j) of [`Place`], 1 at (i+1, j), and so on.
 //!
-//! Rules: OpenSubdiv's, with the corrections for darts, valence 2 and chaikin creases that `notes/accuracy.md` explains.
-//! Hierarchical edits: [`crate::mesh::Edit`].
+//! Rules: OpenSubdiv's, with the corrections for darts, valence 2 and chaikin creases that `notes/accuracy.md`
+//! explains. Hierarchical edits: [`crate::mesh::Edit`].
 
 mod base;
 mod edits;

@@ -172,8 +172,8 @@ impl Task for PointAndTangents<'_> {
     }
 }
 
-/// Positions at all pairs of parameters: point `first + (i, j)` of `out` is at `(u[i], v[j])`. Up to three numbers behind
-/// each row are overwritten.
+/// Positions at all pairs of parameters: point `first + (i, j)` of `out` is at `(u[i], v[j])`. Up to three numbers
+/// behind each row are overwritten.
 pub(super) struct Positions<'a> {
     pub control: &'a ControlPoints,
     pub u: &'a BasisList,

@@ -1,8 +1,8 @@
 //! The vertices of a ring whose plan is known: without finding out again which of them are the same.
 //!
-//! Rings of one plan have the same faces in the same places. A **route** tells for each face after the first across which
-//! half-edge of an earlier one it is reached, and which of its vertices are new. So a ring's vertices are found by as many
-//! hops as it has faces.
+//! Rings of one plan have the same faces in the same places. A **route** tells for each face after the first across
+//! which half-edge of an earlier one it is reached, and which of its vertices are new. So a ring's vertices are found
+//! by as many hops as it has faces.
 
 use super::local::LocalMesh;
 use super::rows::Index;
@@ -14,9 +14,9 @@ const PLACE_BITS: u32 = 4;
 /// Corners of a face on a route, so that its entries have 16 bits.
 const MOST_CORNERS: u32 = 16 - PLACE_BITS;
 
-/// The route of a ring: the new vertices of the target, as bits; then for each further face the half-edge to cross, counted
-/// in the order of faces, and where that leads: the new vertices and, in the lowest bits, the place in the face. Nothing
-/// if there is no route.
+/// The route of a ring: the new vertices of the target, as bits; then for each further face the half-edge to cross,
+/// counted in the order of faces, and where that leads: the new vertices and, in the lowest bits, the place in the
+/// face. Nothing if there is no route.
 pub(super) fn route(ring: &LocalMesh) -> Vec<u32> {
     let mut out = Vec::with_capacity(2 * ring.n_faces());
     let mut n_vertices = 0;

@@ -1,9 +1,9 @@
 //! Rows of sparse matrices, packed: what a plan library mostly consists of.
 //!
-//! Few rows differ in their **weights**, so that each distinct list, a **mask**, is kept once, in f64. Terms are in the order
-//! of their weights: then rows that differ in the order of their columns have one mask. A row is a mask and a list of
-//! columns; equal rows are kept once, and rows that are used together are a list of their numbers. Columns and numbers take
-//! two bytes each as long as there are no more than 65,536 of them; equal lists are kept once, too.
+//! Few rows differ in their **weights**, so that each distinct list, a **mask**, is kept once, in f64. Terms are in the
+//! order of their weights: then rows that differ in the order of their columns have one mask. A row is a mask and a
+//! list of columns; equal rows are kept once, and rows that are used together are a list of their numbers. Columns and
+//! numbers take two bytes each as long as there are no more than 65,536 of them; equal lists are kept once, too.
 
 use super::rules::Row;
 use rustc_hash::FxHashMap;

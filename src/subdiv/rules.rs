@@ -1,7 +1,7 @@
 //! Catmull-Clark's weights: how points of one level follow from the level before, and where they end up.
 //!
-//! A **row** is a sparse list of (point, weight). The rules are those of OpenSubdiv: sharpness decides between the masks
-//! for smooth, crease and corner vertices, and while it decays a vertex is a blend of the mask before and after.
+//! A **row** is a sparse list of (point, weight). The rules are those of OpenSubdiv: sharpness decides between the
+//! masks for smooth, crease and corner vertices, and while it decays a vertex is a blend of the mask before and after.
 
 use super::local::LocalMesh;
 use crate::mesh::{CreaseMethod, TriangleRule};
@@ -116,8 +116,8 @@ fn mask(sharpness: f32, n_sharp: usize) -> Mask {
 
 /// Adds the mean of a face's vertices, times a weight.
 ///
-/// That of a polygon that is the target counts as a point itself, the one after the ring's points: written out, it would
-/// make the rows of a polygon's quarters as long as the polygon has corners.
+/// That of a polygon that is the target counts as a point itself, the one after the ring's points: written out, it
+/// would make the rows of a polygon's quarters as long as the polygon has corners.
 fn add_face_point(row: &mut Row, mesh: &LocalMesh, face: u32, weight: f64) {
     if face == 0 && mesh.n_corners() != 4 {
         row.push((mesh.n_vertices() as u32, weight));
@@ -308,8 +308,8 @@ fn smooth_limit(mesh: &LocalMesh, v: u32, spokes: &[u32]) -> CornerLimit {
     CornerLimit::Smooth(merge(position), tangents.map(merge))
 }
 
-/// The 16 bicubic B-spline control points of a regular ring, `[j][i]` with the target's corner 0 at `[1][1]`, corner 1 at
-/// `[1][2]`; or `None` if the ring is not regular.
+/// The 16 bicubic B-spline control points of a regular ring, `[j][i]` with the target's corner 0 at `[1][1]`, corner 1
+/// at `[1][2]`; or `None` if the ring is not regular.
 pub fn regular_rows(mesh: &LocalMesh) -> Option<[[Row; 4]; 4]> {
     if !mesh.all_quads() || !(0..4).all(|h| is_regular_corner(mesh, h)) {
         return None;
@@ -627,8 +627,8 @@ fn refined_tags(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> VertexTags
     }
 }
 
-/// The row of a refined vertex; vertices must be corners of the target. The column after the ring's points is the face point of
-/// a target that is a polygon.
+/// The row of a refined vertex; vertices must be corners of the target. The column after the ring's points is the face
+/// point of a target that is a polygon.
 pub fn refined_row(rules: &RuleSet, mesh: &LocalMesh, origin: Origin) -> Row {
     match origin {
         Origin::Vertex(h) => vertex_point(rules, mesh, h),

@@ -1,11 +1,12 @@
-//! Limit stencils of poles: the 5 x 5 points of a pole that is cut into 4 x 4 cells, each as one weighted sum of the ring.
+//! Limit stencils of poles: the 5 x 5 points of a pole that is cut into 4 x 4 cells, each as one weighted sum of the
+//! ring.
 //!
 //! Walking down to the apex takes two more steps and six regular parts of one to nine points each, which all have to be
 //! started. Here the points are a dense product instead: 18 terms a point for an apex of five edges, four points in a
 //! register. The weights depend on the number of edges only, and are found by walking down once.
 //!
-//! Pieces of a patch meet at points that both must find to the same bit. So whether a part is found by stencils is decided by
-//! its cells alone and not by the points that are wanted of it.
+//! Pieces of a patch meet at points that both must find to the same bit. So whether a part is found by stencils is
+//! decided by its cells alone and not by the points that are wanted of it.
 
 use super::eval::Point;
 use super::pole::{IN_ORDER, N_BEYOND, N_OUTER, PoleStep, regular_quarters};
@@ -33,7 +34,8 @@ type Weights = Vec<[f64; LANES]>;
 
 static WEIGHTS: [OnceLock<[Weights; 4]>; MOST_EDGES + 1] = [const { OnceLock::new() }; MOST_EDGES + 1];
 
-/// The weights for a ring of so many points around a face whose corner `apex` is the apex; none if it has too many edges.
+/// The weights for a ring of so many points around a face whose corner `apex` is the apex; none if it has too many
+/// edges.
 pub(super) fn weights(n_ring: usize, apex: usize) -> Option<&'static [[f64; LANES]]> {
     let n = (n_ring - 1 - N_OUTER) / 2;
     Some(&WEIGHTS.get(n)?.get_or_init(|| [0, 1, 2, 3].map(|apex| find(n, apex)))[apex])
@@ -89,8 +91,8 @@ fn limit(n: usize, ring: &[Point]) -> Point {
     (ring[0] * (n * n) + edges * 4.0 + faces) * (1.0 / (n * (n + 5.0)))
 }
 
-/// The points (i, j) with i and j from the first to the last of a part of 4 x 4 cells: the first goes to `first` of `out`. Up
-/// to three numbers behind each row are overwritten.
+/// The points (i, j) with i and j from the first to the last of a part of 4 x 4 cells: the first goes to `first` of
+/// `out`. Up to three numbers behind each row are overwritten.
 pub(super) struct StencilGrid<'a, I> {
     pub points: &'a [Point],
     /// See [`PoleStep`].

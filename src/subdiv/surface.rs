@@ -21,8 +21,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The integer grid that tessellated vertices are rounded to: `object = center + step * lattice`.
 ///
-/// The step is a power of two and no control point is further than 2^22 steps from the centre, so that lattice points are
-/// exact in f32, and rounding moves a vertex by less than 2^-22 of the mesh's half extent.
+/// The step is a power of two and no control point is further than 2^22 steps from the centre, so that lattice points
+/// are exact in f32, and rounding moves a vertex by less than 2^-22 of the mesh's half extent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     /// Centre of the mesh in object space.
@@ -137,8 +137,8 @@ impl Surface {
         Self::prepare(mesh, n_threads, &|_| Ok(()))
     }
 
-    /// As [`new`](Self::new); `planned` is told now and then which share of the plans is made, and ends it by an error: nobody
-    /// can tell before how much memory they take.
+    /// As [`new`](Self::new); `planned` is told now and then which share of the plans is made, and ends it by an error:
+    /// nobody can tell before how much memory they take.
     pub fn prepare(mesh: &ControlMesh, n_threads: usize, planned: &dyn Fn(f64) -> Result<()>) -> Result<Self> {
         let n_threads = n_threads.max(1);
         let topology = Topology::new(mesh, n_threads);
@@ -440,7 +440,8 @@ mod tests {
     use crate::mesh::shapes;
     use crate::topology::NONE;
 
-    /// As [`regular_ring`], checked on the way: the 16 vertices around an untagged quad with regular corners, u fastest, by plain hops; `None` for other faces.
+    /// As [`regular_ring`], checked on the way: the 16 vertices around an untagged quad with regular corners, u
+    /// fastest, by plain hops; `None` for other faces.
     fn slow_regular_ring(topology: &Topology, first: u32) -> Option<[u32; 16]> {
         if topology.corners_at(first).1 != 4 {
             return None;

@@ -1,4 +1,5 @@
-//! The same shapes in Embree, by the program `embree_probe` of `../shared/peers`, where the variable `EMBREE_PROBE` names it.
+//! The same shapes in Embree, by the program `embree_probe` of `../shared/peers`, where the variable `EMBREE_PROBE`
+//! names it.
 
 use serde_json::Value;
 use std::process::Command;

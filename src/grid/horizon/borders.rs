@@ -3,11 +3,13 @@
 use crate::grid::CellRect;
 use glam::DVec2;
 
-/// Where the vertices of a patch's grid lie: those of a side with fewer segments than the grid has cells have moved to the segments' ends.
+/// Where the vertices of a patch's grid lie: those of a side with fewer segments than the grid has cells have moved to
+/// the segments' ends.
 pub struct Borders {
     /// All cells of the patch.
     pub cells: CellRect,
-    /// Of the sides v = 0, u = 1, v = 1 and u = 0: where each of the vertices lies along u or v, in cells. Empty where none has moved.
+    /// Of the sides v = 0, u = 1, v = 1 and u = 0: where each of the vertices lies along u or v, in cells. Empty where
+    /// none has moved.
     pub moved: [Vec<f64>; 4],
 }
 

@@ -6,16 +6,18 @@ use crate::grid::{CellRect, MAX_CELLS, PieceView};
 use crate::math::simd::Kernel;
 use glam::Vec3;
 
-/// The least way, in steps times the greatest component of a packed vector: heights over it, of 2^40 at most, are less than [`HIDDEN`].
+/// The least way, in steps times the greatest component of a packed vector: heights over it, of 2^40 at most, are less
+/// than [`HIDDEN`].
 const TINY: f32 = 1e-12;
 
 /// This is taken from the slopes of edges that do not count.
 pub(super) const HIDDEN: f32 = 1e30;
 
-/// What edges along one of u and v are measured by, and how far off scalar products with it can be, for each unit of an edge's size.
+/// What edges along one of u and v are measured by, and how far off scalar products with it can be, for each unit of an
+/// edge's size.
 ///
-/// A scalar product errs by 2^-22 of the sum of the edge's components, times the greatest of the vector's, at most: heights are taken so much
-/// larger, ways along so much shorter.
+/// A scalar product errs by 2^-22 of the sum of the edge's components, times the greatest of the vector's, at most:
+/// heights are taken so much larger, ways along so much shorter.
 #[derive(Clone, Copy)]
 pub(super) struct Measure {
     pub along: Vec3,
@@ -66,7 +68,8 @@ impl Steepest<f32> {
 }
 
 impl Measure {
-    /// The steepest of what was seen and of eight edges, but for those that are [`HIDDEN`]. An edge without length has slopes of zero.
+    /// The steepest of what was seen and of eight edges, but for those that are [`HIDDEN`]. An edge without length has
+    /// slopes of zero.
     #[inline(always)]
     pub fn steeper<K: Kernel>(self, k: K, edges: [K::F; 3], hide: K::F, seen: Steepest<K::F>) -> Steepest<K::F> {
         let [x, y, z] = edges;

@@ -1,39 +1,46 @@
 //! How high a tessellated surface rises, seen from itself: so that rays that leave it need not be tested against it.
 //!
-//! A **chord** runs from any point p of a patch's surface to any other. A ray that starts at p and is higher over its way than every chord from
-//! there does not meet the surface again: all that it could meet is on chords. (Horizon maps, Max 1988, know as much of single points of height fields.)
+//! A **chord** runs from any point p of a patch's surface to any other. A ray that starts at p and is higher over its
+//! way than every chord from there does not meet the surface again: all that it could meet is on chords. (Horizon maps,
+//! Max 1988, know as much of single points of height fields.)
 //!
 //! # What is known
-//! Two vectors, m_u and m_v, and n = m_u x m_v. Of a chord C, m_u·C and m_v·C are its **ways** along u and v, n·C is its **height**. Four
+//! Two vectors, m_u and m_v, and n = m_u x m_v. Of a chord C, m_u·C and m_v·C are its **ways** along u and v, n·C is
+//! its **height**. Four
 //! **rises** say how much height a way along u or v brings at most, to where u (or v) grows or shrinks:
 //!
 //! n·C <= rise_u |m_u·C| + rise_v |m_v·C|,
 //!
-//! with the rises for the signs of the ways. They may be negative: a convex surface falls away from every point of it. They hold for
-//! chords that start in one of four **parts** of the patch's cells along u, and one of four along v.
+//! with the rises for the signs of the ways. They may be negative: a convex surface falls away from every point of it.
+//! They hold for chords that start in one of four **parts** of the patch's cells along u, and one of four along v.
 //!
 //! # How it is found
-//! Let u and v run over the cells of a grid. On each of a cell's two triangles the surface is linear in u and v, with two of the
-//! cell's edges as derivatives. So a chord is a sum of u-edges times what u changes and of v-edges times what v changes, all of u's shares
-//! of one sign and all of v's, and its edges are those of cells between its ends. If each edge of the sum, turned with its share's sign, is below
-//! the **plane** n·W = s_u m_u·W + s_v m_v·W, the chord is. (s has the sign of u's or v's shares; each of the four combinations is a plane, and what
-//! is below one of them is below the highest, which is the inequality above.)
+//! Let u and v run over the cells of a grid. On each of a cell's two triangles the surface is linear in u and v, with
+//! two of the cell's edges as derivatives. So a chord is a sum of u-edges times what u changes and of v-edges times
+//! what v changes, all of u's shares of one sign and all of v's, and its edges are those of cells between its ends. If
+//! each edge of the sum, turned with its share's sign, is below the **plane** n·W = s_u m_u·W + s_v m_v·W, the chord
+//! is. (s has the sign of u's or v's shares; each of the four combinations is a plane, and what is below one of them is
+//! below the highest, which is the inequality above.)
 //!
-//! Of a u-edge, let r be its height and k how far it leads **astray** along v, both for each unit of its way along u. It is below the plane
-//! if s_u >= r + |s_v| k. With K_u and K_v the greatest k of u- and v-edges, R the greatest |r| of each, S_u = R_u + S_v K_u and
-//! S_v = R_v + S_u K_v, which has a solution where K_u K_v < 1, the slope r + S_v k is enough for a u-edge, and none is above S_u; likewise along v.
+//! Of a u-edge, let r be its height and k how far it leads **astray** along v, both for each unit of its way along u.
+//! It is below the plane if s_u >= r + |s_v| k. With K_u and K_v the greatest k of u- and v-edges, R the greatest |r|
+//! of each, S_u = R_u + S_v K_u and S_v = R_v + S_u K_v, which has a solution where K_u K_v < 1, the slope r + S_v k is
+//! enough for a u-edge, and none is above S_u; likewise along v.
 //!
-//! Where a side has fewer segments than the grid has cells, its vertices have **moved** along it ([`Borders`]), and edges from there to the next row lead
-//! far astray. Such triangles cover u and v as before, but for those of no area, if each vertex is taken to be where it has moved to. So they are
-//! measured by their derivatives along u and v instead of by edges (`strip.rs`). A triangle may reach beyond its cell's column or row, by less than
-//! vertices have moved at most: what is ahead of a part begins so much earlier, twice, for where the ray starts and for what it meets.
+//! Where a side has fewer segments than the grid has cells, its vertices have **moved** along it ([`Borders`]), and
+//! edges from there to the next row lead far astray. Such triangles cover u and v as before, but for those of no area,
+//! if each vertex is taken to be where it has moved to. So they are measured by their derivatives along u and v instead
+//! of by edges (`strip.rs`). A triangle may reach beyond its cell's column or row, by less than vertices have moved at
+//! most: what is ahead of a part begins so much earlier, twice, for where the ray starts and for what it meets.
 //!
 //! # Where the ray starts above p
-//! That may be at any point above p along its triangle's normal N, to the side to which the ray leaves. It meets nothing if N is not below any of the
-//! planes. The triangle's own plane is n·W = g_u m_u·W + g_v m_v·W, and N is n - g_u m_u - g_v m_v. By its derivatives g_u m_u·W + g_v m_v·W <= (r + S_v k) m_u·W - S_v
-//! |m_v·W| for its W along u: if |g_v| <= S_v, then g_u <= r + S_v k, and so on; by how much |g_u| exceeded S_u, |g_v| would exceed S_v by 1 / K_u times, and |g_u|
-//! by 1 / (K_u K_v) times, so it does not. So the triangle's plane lies between those of chords over its part, whoever is above these leaves to N's side,
-//! and N is above a plane if (n - g)·(n - s) >= 0 for all g and s of the part's own slopes and of its planes. Where it is not, in **ravines**, nobody leaves.
+//! That may be at any point above p along its triangle's normal N, to the side to which the ray leaves. It meets
+//! nothing if N is not below any of the planes. The triangle's own plane is n·W = g_u m_u·W + g_v m_v·W, and N is
+//! n - g_u m_u - g_v m_v. By its derivatives g_u m_u·W + g_v m_v·W <= (r + S_v k) m_u·W - S_v |m_v·W| for its W along
+//! u: if |g_v| <= S_v, then g_u <= r + S_v k, and so on; by how much |g_u| exceeded S_u, |g_v| would exceed S_v by 1 /
+//! K_u times, and |g_u| by 1 / (K_u K_v) times, so it does not. So the triangle's plane lies between those of chords
+//! over its part, whoever is above these leaves to N's side, and N is above a plane if (n - g)·(n - s) >= 0 for all g
+//! and s of the part's own slopes and of its planes. Where it is not, in **ravines**, nobody leaves.
 
 mod borders;
 mod edges;
@@ -78,8 +85,8 @@ const NO_EDGE: f32 = f32::MIN;
 #[repr(C)]
 pub struct Horizon {
     frame: PackedFrame,
-    /// Along u and v, where it grows and where it shrinks, from each part, in units of n over those of m_u or m_v; even numbers. The lowest bits, one after
-    /// the other, are set for parts (0, 0), (0, 1) and so on that are ravines.
+    /// Along u and v, where it grows and where it shrinks, from each part, in units of n over those of m_u or m_v; even
+    /// numbers. The lowest bits, one after the other, are set for parts (0, 0), (0, 1) and so on that are ravines.
     rises: [[[i8; PARTS]; 2]; 2],
 }
 

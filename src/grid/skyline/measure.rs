@@ -12,8 +12,8 @@ use glam::{IVec3, Vec3};
 /// The least cosine of the angles between triangles of the sheet and the patch that is left.
 const LEAST_COSINE: f32 = 0.05;
 
-/// By what a scalar product of three components errs at most, and what is made of two such, as a share of the greatest component and the sum of
-/// all lengths: 16 roundings of 2^-24.
+/// By what a scalar product of three components errs at most, and what is made of two such, as a share of the greatest
+/// component and the sum of all lengths: 16 roundings of 2^-24.
 const ERROR: f32 = 1.0 / 1_048_576.0;
 
 /// Products of edges are exact up to there.

@@ -1,27 +1,40 @@
-//! How high everything stands that is seen from a patch: so that rays that leave it above that meet nothing at all, and need no walk.
+//! How high everything stands that is seen from a patch: so that rays that leave it above that meet nothing at all, and
+//! need no walk.
 //!
-//! Nine of ten rays that leave a body of a scene meet nothing (occlusion and diffuse rays of the benchmark's meshes). A **skyline** bounds, for each of 4 x 4 **parts** of a patch and each of eight
-//! **octants** of directions around its normal, the **elevation** of all that such a ray may meet (horizon maps, Max 1988, know as much of points).
+//! Nine of ten rays that leave a body of a scene meet nothing (occlusion and diffuse rays of the benchmark's meshes). A
+//! **skyline** bounds, for each of 4 x 4 **parts** of a patch and each of eight
+//! **octants** of directions around its normal, the **elevation** of all that such a ray may meet (horizon maps, Max
+//! 1988, know as much of points).
 //!
 //! # The frame
-//! Vectors m_u, m_v and n = m_u x m_v, or its opposite, which points to the side that is left. w has the coordinates x = m_u·w, y = m_v·w, and its height z = n·w.
-//! Octants are told apart by the signs of x and y and by which of them is greater in magnitude: in an octant, w goes **ahead** by max(|x|, |y|), which is linear there. Elevation is height for what one goes ahead.
+//! Vectors m_u, m_v and n = m_u x m_v, or its opposite, which points to the side that is left. w has the coordinates
+//! x = m_u·w, y = m_v·w, and its height z = n·w. Octants are told apart by the signs of x and y and by which of them is
+//! greater in magnitude: in an octant, w goes **ahead** by max(|x|, |y|), which is linear there. Elevation is height
+//! for what one goes ahead.
 //!
 //! # What is near
-//! Some patches, the **sheet**: the own one and others that share corners with it. Two sides of them are joined if their vertices are the same one after the other; those that are not joined to exactly one other are open. Each triangle of the sheet is
-//! seen from n: its normal is turned less than 87 degrees. So the sheet is the graph of a function locally. Take a rectangle D of x and y that none of the sheet's open sides enters, and around whose
-//! middle they wind once: each point of D has exactly one point of the sheet above it, since a sheet that is the graph of a function locally has as many there as its border winds (its degree), and that is the same everywhere in D.
+//! Some patches, the **sheet**: the own one and others that share corners with it. Two sides of them are joined if
+//! their vertices are the same one after the other; those that are not joined to exactly one other are open. Each
+//! triangle of the sheet is seen from n: its normal is turned less than 87 degrees. So the sheet is the graph of a
+//! function locally. Take a rectangle D of x and y that none of the sheet's open sides enters, and around whose middle
+//! they wind once: each point of D has exactly one point of the sheet above it, since a sheet that is the graph of a
+//! function locally has as many there as its border winds (its degree), and that is the same everywhere in D.
 //!
-//! Let a ray start over D, above the sheet or on it, and meet a point t of the sheet over D. Between, above a straight line of D, runs a way on the sheet: go along it from where the ray starts, from triangle to triangle; it ends in t, as
-//! nothing else is above t's place. So the ray is not steeper than the steepest triangle on the way, seen along it. Triangles on the way are of blocks of the sheet that, from some point of the part, lie ahead in the ray's octant; the steepest of them, in
-//! the steepest direction of the octant, is the elevation of what is near.
+//! Let a ray start over D, above the sheet or on it, and meet a point t of the sheet over D. Between, above a straight
+//! line of D, runs a way on the sheet: go along it from where the ray starts, from triangle to triangle; it ends in t,
+//! as nothing else is above t's place. So the ray is not steeper than the steepest triangle on the way, seen along it.
+//! Triangles on the way are of blocks of the sheet that, from some point of the part, lie ahead in the ray's octant;
+//! the steepest of them, in the steepest direction of the octant, is the elevation of what is near.
 //!
 //! # What is far
-//! All else, and what is near but not inside of D, is put into boxes of x, y and z. From a box around the part to another the elevation in an octant is the greatest height over the least that one goes ahead, of the differences of their points that lie in that octant.
+//! All else, and what is near but not inside of D, is put into boxes of x, y and z. From a box around the part to
+//! another the elevation in an octant is the greatest height over the least that one goes ahead, of the differences of
+//! their points that lie in that octant.
 //!
 //! # Where the ray starts
-//! On a triangle of the part, or above it along the triangle's normal N, as far as the skyline's **lift**, which D and the part's box allow for. It is above the sheet there if N itself is higher than what is near in N's octant:
-//! where that does not hold, nobody leaves.
+//! On a triangle of the part, or above it along the triangle's normal N, as far as the skyline's **lift**, which D and
+//! the part's box allow for. It is above the sheet there if N itself is higher than what is near in N's octant: where
+//! that does not hold, nobody leaves.
 
 mod measure;
 mod octants;
@@ -70,8 +83,8 @@ impl Skyline {
         bytemuck::cast(self)
     }
 
-    /// Roughly which share of diffuse rays from all over the patch clear it, in percent: those that are higher than an angle above the horizontal are
-    /// the square of its cosine of all, whichever octant they are in.
+    /// Roughly which share of diffuse rays from all over the patch clear it, in percent: those that are higher than an
+    /// angle above the horizontal are the square of its cosine of all, whichever octant they are in.
     pub fn openness(&self) -> u32 {
         let above = |elevation: i8| {
             let slope = f32::from(elevation.max(0)) / UNITS / PACKED;
@@ -81,8 +94,8 @@ impl Skyline {
         (100.0 * all.iter().map(|elevation| above(*elevation)).sum::<f32>() / all.len() as f32) as u32
     }
 
-    /// Whether a ray in that direction, which starts on a triangle of cell `cell` or up to `lift` lattice steps above it, is so high that it meets nothing. `word` reads one of the skyline's
-    /// words: few of them are.
+    /// Whether a ray in that direction, which starts on a triangle of cell `cell` or up to `lift` lattice steps above
+    /// it, is so high that it meets nothing. `word` reads one of the skyline's words: few of them are.
     #[inline(always)]
     pub fn is_cleared_by<K: Kernel>(
         k: K,

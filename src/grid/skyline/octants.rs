@@ -112,8 +112,8 @@ impl<K: Kernel> Between<K> {
     }
 }
 
-/// Raises, octant by octant, how steep triangles are at most in the octant's directions, for triangles that rise by `x` along x and by `y` along y, one
-/// a lane; `error` is by what both together may be greater.
+/// Raises, octant by octant, how steep triangles are at most in the octant's directions, for triangles that rise by `x`
+/// along x and by `y` along y, one a lane; `error` is by what both together may be greater.
 #[inline(always)]
 pub(super) fn steepest<K: Kernel>(k: K, [x, y]: [K::F; 2], error: K::F, all: &mut [K::F; 8]) {
     let zero = k.splat(0.0);

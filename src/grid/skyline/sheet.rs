@@ -79,7 +79,8 @@ impl Frame {
 }
 
 impl SkylineSheet {
-    /// Of all pieces of a patch on which the ray starts, seen from the side to which it leaves; `None` if that is no side, or bent too much.
+    /// Of all pieces of a patch on which the ray starts, seen from the side to which it leaves; `None` if that is no
+    /// side, or bent too much.
     pub fn new(pieces: &[PieceView<'_>], ray: &LatticeRay) -> Option<Self> {
         let cells = cells_of(pieces);
         let sides = sides_of(pieces, cells);

@@ -160,7 +160,8 @@ impl Border {
         Self { sides: open }
     }
 
-    /// A rectangle around that box which no edge enters, and over each of whose points there is one of the sheet; its least and greatest x and y.
+    /// A rectangle around that box which no edge enters, and over each of whose points there is one of the sheet; its
+    /// least and greatest x and y.
     fn clearing(&self, around: &Bounds, widths: Vec3) -> Option<[Vec2; 2]> {
         let middle = around.center().as_dvec3().truncate();
         let widths = widths.as_dvec3().truncate();
@@ -183,7 +184,8 @@ impl Border {
     }
 }
 
-/// Whether the half-line from a place towards greater x is crossed on the way from a to b, and from which side: 1, -1 or 0.
+/// Whether the half-line from a place towards greater x is crossed on the way from a to b, and from which side: 1, -1
+/// or 0.
 fn winding(from: DVec2, a: DVec2, b: DVec2) -> i32 {
     if (a.y <= from.y) == (b.y <= from.y) || a.x + (from.y - a.y) / (b.y - a.y) * (b.x - a.x) <= from.x {
         return 0;

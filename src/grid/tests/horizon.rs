@@ -14,7 +14,8 @@ fn first() -> TriangleId {
     TriangleId::new(PATCH, 0, 0, 0)
 }
 
-/// A sheet of n_u x n_v cells like [`sheet`], with bumps of `bump` cells and a bend that rises by `bend` cells from the middle to the ends along u.
+/// A sheet of n_u x n_v cells like [`sheet`], with bumps of `bump` cells and a bend that rises by `bend` cells from the
+/// middle to the ends along u.
 fn smooth(random: &mut Random, n_u: usize, n_v: usize, width: f64, bump: f64, bend: f64) -> Vec<[i32; 3]> {
     let flat = sheet(random, 2, 2, width);
     let at = |k: usize| IVec3::from_array(flat[k]).as_dvec3();
@@ -72,7 +73,8 @@ impl Decoded {
         }
     }
 
-    /// How high the line along `way` is over the horizon from a cell, in the length of the way; `None` if nobody clears it.
+    /// How high the line along `way` is over the horizon from a cell, in the length of the way; `None` if nobody clears
+    /// it.
     fn height(&self, cell: [u32; 2], way: DVec3) -> Option<f64> {
         let mut height = self.up.dot(way);
         let part = |axis: usize| (f64::from(cell[axis]) * self.parts_per_cell[axis]) as usize;
@@ -92,8 +94,8 @@ impl Decoded {
     }
 }
 
-/// How high the highest chord is over the horizon, of those between all vertices of triangles and points of them that are looked at, as far as
-/// rays from where it starts may clear the horizon.
+/// How high the highest chord is over the horizon, of those between all vertices of triangles and points of them that
+/// are looked at, as far as rays from where it starts may clear the horizon.
 fn highest_chord(random: &mut Random, vertices: &[[i32; 3]], cells: CellRect, horizon: Horizon) -> f64 {
     let decoded = Decoded::new(horizon);
     let of_triangle = |(id, [a, b, c]): (TriangleId, [DVec3; 3])| {
@@ -270,7 +272,8 @@ impl Task for IsCleared<'_> {
     }
 }
 
-/// A cylinder seen from outside: no ray that leaves upwards meets it, and only where a part bends are there some that are kept.
+/// A cylinder seen from outside: no ray that leaves upwards meets it, and only where a part bends are there some that
+/// are kept.
 #[test]
 fn convex_surfaces_are_left_by_nearly_all_rays() {
     let at = |i: usize, j: usize| {

@@ -12,7 +12,8 @@ const PATCH: PatchId = PatchId(3);
 /// Radius of the cylinder, in lattice steps.
 const RADIUS: f64 = 1e6;
 
-/// A patch of 8 x 8 cells on a cylinder about the y axis, over these angles in degrees and heights in radii; from outside it is seen counterclockwise.
+/// A patch of 8 x 8 cells on a cylinder about the y axis, over these angles in degrees and heights in radii; from
+/// outside it is seen counterclockwise.
 fn on_cylinder(angles: [f64; 2], heights: [f64; 2]) -> Vec<[i32; 3]> {
     let between = |[a, b]: [f64; 2], k: usize| a + (b - a) * k as f64 / 8.0;
     let places = (0..=8).flat_map(|j| (0..=8).map(move |i| (i, j)));
@@ -124,7 +125,8 @@ fn directions_of_any_length_are_cleared_or_none() {
     }
 }
 
-/// On the inner side of a cylinder what is around stands high: near patches, patches of the sheet beyond the clearing, and patches that are not of the sheet.
+/// On the inner side of a cylinder what is around stands high: near patches, patches of the sheet beyond the clearing,
+/// and patches that are not of the sheet.
 #[test]
 fn rays_above_the_walls_of_a_valley_meet_none_of_them() {
     let mut random = Random(0x0001_a11e);

@@ -34,7 +34,8 @@ fn open_ray(origin: DVec3, direction: DVec3) -> LatticeRay {
     LatticeRay::new(origin, direction, f32::INFINITY, TriangleId::NONE)
 }
 
-/// A ray that is aimed at a vertex, an edge, or somewhere in a sheet; some along an axis, some grazing, some from a vertex.
+/// A ray that is aimed at a vertex, an edge, or somewhere in a sheet; some along an axis, some grazing, some from a
+/// vertex.
 fn aimed(random: &mut Random, vertices: &[[i32; 3]], width: f64, round: usize) -> LatticeRay {
     let mut vertex = || IVec3::from_array(vertices[(random.unit() * vertices.len() as f64) as usize]).as_dvec3();
     let (a, b, c) = (vertex(), vertex(), vertex());
@@ -64,7 +65,8 @@ fn aimed(random: &mut Random, vertices: &[[i32; 3]], width: f64, round: usize) -
     }
 }
 
-/// How far, across the ray, the kernels may be off: the perturbation of vertices in `LatticeRay`'s argument, and a little.
+/// How far, across the ray, the kernels may be off: the perturbation of vertices in `LatticeRay`'s argument, and a
+/// little.
 fn blur(ray: &LatticeRay, width: f64) -> f64 {
     let far = ray.near_origin[..3].iter().fold(0.0f64, |m, o| m.max(f64::from(o.abs())));
     (far + 1.7e7) * 8.0 * f64::powi(2.0, -24) + 1e-6 * width

@@ -4,7 +4,8 @@
 use super::{Kernel, ONE_LANE, PLACE_ZERO, SET_LANES, Task};
 use std::arch::x86_64::*;
 
-/// Eight lanes in one register. A value of this type proves that the processor has AVX2 (and the small extensions that came with it).
+/// Eight lanes in one register. A value of this type proves that the processor has AVX2 (and the small extensions that
+/// came with it).
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2(());
 
@@ -206,8 +207,8 @@ impl Kernel for Avx2 {
     #[inline(always)]
     fn nearest4(self, x: __m256d) -> [i32; 4] {
         let mut out = [0; 4];
-        // SAFETY: `self` proves AVX2; `out` is 16 writable bytes and the store needs no alignment. Rounding is to nearest,
-        // since nobody changes the processor's mode.
+        // SAFETY: `self` proves AVX2; `out` is 16 writable bytes and the store needs no alignment. Rounding is to
+        // nearest, since nobody changes the processor's mode.
         unsafe { _mm_storeu_si128(out.as_mut_ptr().cast(), _mm256_cvtpd_epi32(x)) };
         out
     }
@@ -261,7 +262,8 @@ impl Kernel for Avx2 {
     #[inline(always)]
     fn packed(self, x: &[u32; 8], mask: u8) -> [u32; 8] {
         let mut out = [0; 8];
-        // SAFETY: `self` proves AVX2; `x` is 32 readable bytes, the list of lanes 8, and `out` is 32 writable ones; nothing needs alignment.
+        // SAFETY: `self` proves AVX2; `x` is 32 readable bytes, the list of lanes 8, and `out` is 32 writable ones;
+        // nothing needs alignment.
         unsafe {
             let lanes = _mm256_cvtepu8_epi32(_mm_loadl_epi64(SET_LANES[usize::from(mask)].as_ptr().cast()));
             let packed = _mm256_permutevar8x32_epi32(_mm256_loadu_si256(x.as_ptr().cast()), lanes);
@@ -333,7 +335,8 @@ impl Kernel for Avx2 {
     #[inline(always)]
     unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> __m256 {
         debug_assert!(at.iter().all(|at| at + if BYTES == 2 { 8 } else { 16 } <= bytes.len()));
-        // SAFETY: `self` proves AVX2; the caller promises that the 8 (for BYTES = 2) or 16 bytes from both places are inside `bytes`.
+        // SAFETY: `self` proves AVX2; the caller promises that the 8 (for BYTES = 2) or 16 bytes from both places are
+        // inside `bytes`.
         unsafe {
             let low = bytes.as_ptr().add(at[0]).cast();
             let high = bytes.as_ptr().add(at[1]).cast();

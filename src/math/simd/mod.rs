@@ -1,16 +1,18 @@
 //! Eight floats at a time, the same bits on every processor.
 //!
-//! A **kernel** is a set of operations on eight lanes. [`Portable`] does them on arrays and works everywhere; [`Avx2`] does
-//! them in registers. Traversal and intersection are written once, generic over [`Kernel`], and marked
-//! `#[inline(always)]`. A [`Task`] is such code with its arguments; [`run`] picks the kernel and enters it through one function
-//! compiled for that kernel's instructions, so that everything inlined into it uses them. Call [`run`] once per batch
-//! of rays or once per ray, never per node.
+//! A **kernel** is a set of operations on eight lanes. [`Portable`] does them on arrays and works everywhere; [`Avx2`]
+//! does them in registers. Traversal and intersection are written once, generic over [`Kernel`], and marked
+//! `#[inline(always)]`. A [`Task`] is such code with its arguments; [`run`] picks the kernel and enters it through one
+//! function compiled for that kernel's instructions, so that everything inlined into it uses them. Call [`run`] once
+//! per batch of rays or once per ray, never per node.
 //!
 //! # Invariants
 //! 1. Both kernels give the same bits: an operation is one IEEE operation, correctly rounded; none is fused. A fused
-//!    multiply-add would also break the watertightness of triangles, whose edge functions must be exact negatives of each other.
-//!    The one exception, [`Kernel::mul_add`], is for boxes, where it can change what is visited but not what is hit.
-//! 2. An `Avx2` value exists only where the processor has AVX2: it is the witness that every `unsafe` block there leans on.
+//!    multiply-add would also break the watertightness of triangles, whose edge functions must be exact negatives of
+//!    each other. The one exception, [`Kernel::mul_add`], is for boxes, where it can change what is visited but not
+//!    what is hit.
+//! 2. An `Avx2` value exists only where the processor has AVX2: it is the witness that every `unsafe` block there leans
+//!    on.
 
 #![allow(unsafe_code)]
 
@@ -76,8 +78,8 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn negative(self, x: Self::F) -> u32;
     /// Four integers as floats, in each half.
     fn floats_twice(self, x: &[i32; 4]) -> Self::F;
-    /// In each half, lanes 0 to 2 of `scale` times two to the power of byte 0 to 2 of `powers`; the fourth lane is any number. `scale` and
-    /// the result are neither zero, subnormal nor infinite.
+    /// In each half, lanes 0 to 2 of `scale` times two to the power of byte 0 to 2 of `powers`; the fourth lane is any
+    /// number. `scale` and the result are neither zero, subnormal nor infinite.
     fn scaled_twice(self, scale: Self::F, powers: i32) -> Self::F;
 
     /// `x` in every lane.
@@ -127,14 +129,16 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn store_i(self, x: Self::I) -> [i32; 8];
     /// Lanes 0, 2, 4 and 6 of both.
     fn even_lanes(self, a: Self::I, b: Self::I) -> Self::I;
-    /// The lower three bytes of each lane in little-endian order, those of four lanes together and four zeros after them.
+    /// The lower three bytes of each lane in little-endian order, those of four lanes together and four zeros after
+    /// them.
     fn lower_threes(self, x: Self::I) -> [[u8; 16]; 2];
     /// Lanes of 32 bits, those first whose bits are set in `mask`, in their order; then lane 0 again and again.
     fn packed(self, x: &[u32; 8], mask: u8) -> [u32; 8];
     /// The lower halves of the lanes.
     fn lower_halves(self, x: Self::I) -> [u16; 8];
 
-    /// Where lanes come in the order of `enter`, as [`place`] says; [`LAST`](Self::LAST) for those that are left before they are entered.
+    /// Where lanes come in the order of `enter`, as [`place`] says; [`LAST`](Self::LAST) for those that are left before
+    /// they are entered.
     fn in_order(self, enter: Self::F, leave: Self::F) -> Self::O;
     /// The first lane in the order, and its place.
     fn first(self, order: Self::O) -> (usize, u16);
@@ -147,14 +151,15 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     /// The places as an array.
     fn store_order(self, x: Self::O) -> [u16; 8];
 
-    /// Two runs of four little-endian unsigned integers of `BYTES` bytes each (2, 3 or 4), at `at[0]` and `at[1]`; `base` is added to each
-    /// (wrapping) and the sums are converted to floats.
+    /// Two runs of four little-endian unsigned integers of `BYTES` bytes each (2, 3 or 4), at `at[0]` and `at[1]`;
+    /// `base` is added to each (wrapping) and the sums are converted to floats.
     ///
     /// # Safety
     /// `at[k] + 16 <= bytes.len()` for both k; for `BYTES` = 2, `at[k] + 8 <= bytes.len()` is enough.
     unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> Self::F;
 
-    /// Does `task` in a function compiled for this kernel's instructions: for code that must not be inlined into its caller.
+    /// Does `task` in a function compiled for this kernel's instructions: for code that must not be inlined into its
+    /// caller.
     fn enter<T: Task>(self, task: T) -> T::Output;
 
     /// Asks for the cache line of `x`, which may be any address.
@@ -167,8 +172,8 @@ const PLACE_ZERO: f32 = (1u64 << 33) as f32;
 /// Lattice steps from one place in an order of distances to the next.
 const PLACE_STEP: f32 = 1024.0;
 
-/// The place of a distance from 0 up to three times 2^24, which is as far as a lattice reaches, and of greater ones a place after those.
-/// It never falls as the distance grows.
+/// The place of a distance from 0 up to three times 2^24, which is as far as a lattice reaches, and of greater ones a
+/// place after those. It never falls as the distance grows.
 #[inline(always)]
 pub fn place(distance: f32) -> u16 {
     const GREATEST: f32 = 65_000.0 * PLACE_STEP;

@@ -246,8 +246,8 @@ impl Kernel for Portable {
     fn store_order(self, x: [u16; 8]) -> [u16; 8] {
         x
     }
-    // SAFETY: nothing here relies on the caller's promise: a place outside `bytes` panics. The trait says `unsafe` for kernels
-    // that read without looking.
+    // SAFETY: nothing here relies on the caller's promise: a place outside `bytes` panics. The trait says `unsafe` for
+    // kernels that read without looking.
     #[inline(always)]
     unsafe fn integers<const BYTES: usize>(self, bytes: &[u8], at: [usize; 2], base: i32) -> [f32; 8] {
         from_fn(|k| {

@@ -58,7 +58,8 @@ impl<'a, T: Tracer> Shader<'a, T> {
             let Some(glass) = x.material.glass else {
                 return Vec3::ZERO;
             };
-            // Straight through, so as seen from outside on both surfaces: inside, a refracted ray would be less oblique.
+            // Straight through, so as seen from outside on both surfaces: inside, a refracted ray would be less
+            // oblique.
             let reflectance = Interaction { outside: true, ..x }.interface(glass.ior).reflectance;
             share *= glass.transmit * (1.0 - reflectance) as f32;
             ray = Ray { t_max: ray.t_max - x.hit.t, ..x.leaving(ray.direction) };

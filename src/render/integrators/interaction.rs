@@ -55,8 +55,8 @@ impl<'a> Interaction<'a> {
         direction.dot(self.geometric_normal) > 0.0
     }
 
-    /// The mirrored direction. Near silhouettes the limit normal may mirror into the triangle; the triangle's own normal
-    /// is used then.
+    /// The mirrored direction. Near silhouettes the limit normal may mirror into the triangle; the triangle's own
+    /// normal is used then.
     pub fn mirrored(&self) -> DVec3 {
         let about = |normal: DVec3| 2.0 * self.to_eye.dot(normal) * normal - self.to_eye;
         let direction = about(self.normal);

@@ -1,9 +1,9 @@
 //! What of a sample varies smoothly over a surface, and what decides where it does not: the matter of interpolation.
 //!
 //! A [`Probe`] is a sample with its **smooth** parts: normal, inverse depth (linear over the picture on a plane), light
-//! that came by reflection or refraction. Its **trail** tells which way the light took: lights that were blocked, meshes
-//! that secondary rays hit, and where on their patterns. Between probes with the same trail, where what mirrors show is not
-//! turned too far, the smooth parts can be interpolated and shaded again, without a ray.
+//! that came by reflection or refraction. Its **trail** tells which way the light took: lights that were blocked,
+//! meshes that secondary rays hit, and where on their patterns. Between probes with the same trail, where what mirrors
+//! show is not turned too far, the smooth parts can be interpolated and shaded again, without a ray.
 
 use super::{Sample, Shader};
 use crate::ids::MeshId;
@@ -15,8 +15,9 @@ use crate::scene::camera::Camera;
 use crate::scene::description::Albedo;
 use glam::{DVec3, Vec3};
 
-/// Radiance by reflection, at most, of a point that a pixel may miss. When pixels of all mirrors were settled as readily as others
-/// (`samples`), four of 100 pictures of mirrors of 0.5 and 0.9 lost one glint more, and chess lost one on its board, which reflects
+/// Radiance by reflection, at most, of a point that a pixel may miss. When pixels of all mirrors were settled as
+/// readily as others (`samples`), four of 100 pictures of mirrors of 0.5 and 0.9 lost one glint more, and chess lost
+/// one on its board, which reflects
 /// 0.07 of lights as bright as 16; of those below this, none of 100 lost any.
 const MOST_UNSEEN: f32 = 0.25;
 
@@ -48,9 +49,11 @@ pub(in crate::render) struct Smooth {
     /// Radiance that did not come from a light directly.
     pub secondary: Vec3,
     pub lights: LightMasks,
-    /// Equal for samples whose secondary rays hit the same meshes, on the same cube of a pattern, and had the same lights.
+    /// Equal for samples whose secondary rays hit the same meshes, on the same cube of a pattern, and had the same
+    /// lights.
     pub signature: u64,
-    /// Unit normals of what is seen by reflection and refraction, each times the share of its light that reaches the eye.
+    /// Unit normals of what is seen by reflection and refraction, each times the share of its light that reaches the
+    /// eye.
     pub mirrored_normal: Vec3,
 }
 
@@ -176,7 +179,8 @@ impl Appearance {
         !self.any_glass && self.lights.len() <= LightMasks::CAPACITY
     }
 
-    /// Whether nothing bright can be seen in a mesh's reflections: in mirrors and glass, things and lights may be as small as points.
+    /// Whether nothing bright can be seen in a mesh's reflections: in mirrors and glass, things and lights may be as
+    /// small as points.
     pub(in crate::render) fn reflects_little(&self, mesh: MeshId) -> bool {
         let material = &self.materials[mesh.idx()];
         let share = material.mirror.max_element();

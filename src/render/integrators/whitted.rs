@@ -8,8 +8,8 @@ use crate::render::tracer::Tracer;
 use crate::scene::description::Glass;
 use glam::{DVec3, Vec3};
 
-/// Rays that add less than this share to a pixel are not traced: of radiance 1 it is a third of an 8-bit step where sRGB
-/// is steepest.
+/// Rays that add less than this share to a pixel are not traced: of radiance 1 it is a third of an 8-bit step where
+/// sRGB is steepest.
 const MIN_WEIGHT: f32 = 1e-4;
 
 /// A ray that is still to be traced.

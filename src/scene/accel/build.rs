@@ -1,6 +1,6 @@
-//! Boxes to wide tree: `parts.rs` divides them into parts, `groups.rs` puts eight neighbours each into a node, obvhs clusters
-//! the groups of a part into a binary tree, `collapse.rs` makes that wide, and the trees of all parts become the lanes of
-//! one more tree.
+//! Boxes to wide tree: `parts.rs` divides them into parts, `groups.rs` puts eight neighbours each into a node, obvhs
+//! clusters the groups of a part into a binary tree, `collapse.rs` makes that wide, and the trees of all parts become
+//! the lanes of one more tree.
 //!
 //! ```text
 //!   nodes   ┌─────────────┬──────────────────┬──────────────────┬─ ..
@@ -8,11 +8,11 @@
 //!           └─────────────┴──────────────────┴──────────────────┴─ ..    until it is put in its place
 //! ```
 //!
-//! obvhs merges pairs of boxes that are each other's nearest. Among equal boxes, or along a row of equally spaced ones, one
-//! pair a round is all there is, and the time becomes quadratic. So it is given boxes that are moved a little along the
-//! longest axis of the whole, each by its own amount, and widened by a few lattice steps, which leaves no ties; the tree
-//! then gets the true boxes back. Across the longest axis centres stay where they are, so that what is flat stays flat: the
-//! order along the space-filling curve would be that of noise otherwise.
+//! obvhs merges pairs of boxes that are each other's nearest. Among equal boxes, or along a row of equally spaced ones,
+//! one pair a round is all there is, and the time becomes quadratic. So it is given boxes that are moved a little along
+//! the longest axis of the whole, each by its own amount, and widened by a few lattice steps, which leaves no ties; the
+//! tree then gets the true boxes back. Across the longest axis centres stay where they are, so that what is flat stays
+//! flat: the order along the space-filling curve would be that of noise otherwise.
 
 use super::collapse::{Collapse, Lane, parents_first};
 use super::groups::{Group, groups};
@@ -35,7 +35,8 @@ pub const BUILD_BYTES_PER_PATCH: usize = 8;
 /// Fewer than there are as a rule: room for the nodes of large trees is set aside by it.
 const PATCHES_PER_NODE: usize = 5;
 
-/// How far a box is moved at most to either side, as twice the share of its size: enough to break ties, too little to change clusters.
+/// How far a box is moved at most to either side, as twice the share of its size: enough to break ties, too little to
+/// change clusters.
 const JITTER: f32 = 0.02;
 
 /// The same in lattice steps, for boxes without extent.
@@ -45,9 +46,10 @@ const JITTER_STEPS: f32 = 1.0;
 /// points on a line have an area then.
 const WIDENING_STEPS: f32 = 16.0;
 
-/// Patches up to which a tree is built thoroughly. That takes 2 to 3 ms of the 19 in which trex (11,946 patches) is prepared, and rays visit 1 to 5 %
-/// less afterwards. With 38,000 to 47,000 patches (a crowd, a ground, a scan of 30,000 faces, rates 8 and 16) it makes preparing take 1.04 to 1.5 times as long, and
-/// occlusion, diffuse and shuffled rays 1.00 to 1.11 times as fast. Of the 0.62 s of a ground of two million patches it would take 0.29 more.
+/// Patches up to which a tree is built thoroughly. That takes 2 to 3 ms of the 19 in which trex (11,946 patches) is
+/// prepared, and rays visit 1 to 5 % less afterwards. With 38,000 to 47,000 patches (a crowd, a ground, a scan of
+/// 30,000 faces, rates 8 and 16) it makes preparing take 1.04 to 1.5 times as long, and occlusion, diffuse and shuffled
+/// rays 1.00 to 1.11 times as fast. Of the 0.62 s of a ground of two million patches it would take 0.29 more.
 const MOST_THOROUGH: usize = 1 << 16;
 
 /// The stack that a tree of a part needs if all went well, and more: of trex 50.
@@ -121,8 +123,8 @@ impl Nodes {
 }
 
 impl TopLevel {
-    /// The tree over `patches`: boxes in lattice units, finite, that hold every lattice vertex of the patch. At most 2^28 of
-    /// them. The same tree for any number of threads.
+    /// The tree over `patches`: boxes in lattice units, finite, that hold every lattice vertex of the patch. At most
+    /// 2^28 of them. The same tree for any number of threads.
     pub fn build(patches: &[Bounds], n_threads: usize) -> Self {
         if patches.is_empty() {
             let mut nodes = Nodes::default();

@@ -1,5 +1,5 @@
-//! Which nodes of the binary tree become lanes of the wide one: least surface-area cost by dynamic programming
-//! (Ylitie, Karras, Laine: "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, section 3.1).
+//! Which nodes of the binary tree become lanes of the wide one: least surface-area cost by dynamic programming (Ylitie,
+//! Karras, Laine: "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, section 3.1).
 
 use super::LANES;
 use super::groups::{Group, half_area};
@@ -29,8 +29,8 @@ pub(super) enum Lane {
 #[derive(Clone, Copy, Default)]
 struct Plan {
     cost: [f32; LANES - 1],
-    /// Lanes for the first child; 0 if the node stays one lane. Index 7 is the split of a wide node's eight lanes. A group is
-    /// taken apart where this is not 0.
+    /// Lanes for the first child; 0 if the node stays one lane. Index 7 is the split of a wide node's eight lanes. A
+    /// group is taken apart where this is not 0.
     first: [u8; LANES],
 }
 

@@ -1,15 +1,17 @@
 //! Fronts: where rays that are much alike begin in the tree.
 //!
-//! Rays of one tile of a picture meet the same few patches. A **bundle** is all rays whose origins and directions lie within
-//! bounds; its **front** are the leaves that some ray of it may meet, found once for all, nearest first, in groups of eight that are tested like nodes.
-//! So a ray of the bundle needs no way down: tests of groups do not wait for each other as those of a node and its child do. Where there are more leaves than a
-//! front holds, nodes above them stand in their place.
+//! Rays of one tile of a picture meet the same few patches. A **bundle** is all rays whose origins and directions lie
+//! within bounds; its **front** are the leaves that some ray of it may meet, found once for all, nearest first, in
+//! groups of eight that are tested like nodes. So a ray of the bundle needs no way down: tests of groups do not wait
+//! for each other as those of a node and its child do. Where there are more leaves than a front holds, nodes above them
+//! stand in their place.
 //!
-//! What a bundle meets is found by the arithmetic of intervals: over all its rays, the way into a box is no shorter than the least quotient of bounds, and
-//! the way to its end no longer than the greatest. Both are taken with a margin above the slack of [`LatticeRay`], so that a front holds every leaf whose box a ray meets.
+//! What a bundle meets is found by the arithmetic of intervals: over all its rays, the way into a box is no shorter
+//! than the least quotient of bounds, and the way to its end no longer than the greatest. Both are taken with a margin
+//! above the slack of [`LatticeRay`], so that a front holds every leaf whose box a ray meets.
 //!
-//! Reshetov, Soupikov, Hurley, "Multi-Level Ray Tracing Algorithm", 2005 (entry points); Boulos, Wald, Shirley, "Geometric and arithmetic culling methods for
-//! entire ray packets", 2006.
+//! Reshetov, Soupikov, Hurley, "Multi-Level Ray Tracing Algorithm", 2005 (entry points); Boulos, Wald, Shirley,
+//! "Geometric and arithmetic culling methods for entire ray packets", 2006.
 
 use super::traverse::{TraversalStack, Walk};
 use super::{EMPTY, LANES, LEAF, LeafRef, LeafWalk, NodeBoxes, Refs, TopLevel};
@@ -22,7 +24,8 @@ use glam::{DVec3, Vec3};
 /// Leaves and nodes of a front, at most.
 const MOST_ITEMS: usize = 64;
 
-/// By how much boxes grow, in lattice steps: rays are tested with a slack of 60 at most, and rounded to f32 within [`FARTHEST`].
+/// By how much boxes grow, in lattice steps: rays are tested with a slack of 60 at most, and rounded to f32 within
+/// [`FARTHEST`].
 const MARGIN: f32 = 256.0;
 
 /// By how much quotients grow, relatively.
@@ -134,7 +137,8 @@ impl Group {
 }
 
 impl TopLevel {
-    /// Finds the front of a bundle in the tree's space. Returns whether there is one; there is none for origins that are too far away.
+    /// Finds the front of a bundle in the tree's space. Returns whether there is one; there is none for origins that
+    /// are too far away.
     #[inline(always)]
     pub fn find_front<K: Kernel>(&self, k: K, bundle: &RayBounds, front: &mut Front) -> bool {
         front.bounds = NO_RAY;

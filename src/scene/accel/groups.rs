@@ -1,8 +1,8 @@
 //! Putting boxes into **groups** of eight neighbours: the lanes of one node each.
 //!
-//! A tree made wide from a binary one has four or five children a node, since most subtrees of a binary tree have no eight
-//! leaves. So boxes are divided from the top, every time at a multiple of eight of them, by the least surface-area cost:
-//! all groups but the last are full then, and what is above them has an eighth of the boxes.
+//! A tree made wide from a binary one has four or five children a node, since most subtrees of a binary tree have no
+//! eight leaves. So boxes are divided from the top, every time at a multiple of eight of them, by the least
+//! surface-area cost: all groups but the last are full then, and what is above them has an eighth of the boxes.
 
 use super::LANES;
 use super::build::Care;

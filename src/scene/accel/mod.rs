@@ -1,8 +1,8 @@
 //! The top level: a tree over the boxes of a mesh's patches, in lattice space.
 //!
-//! It is a **wide tree**: its **nodes** have up to eight **lanes**. A lane is empty, an
-//! inner node or a **leaf**: one patch. A leaf is named by its **leaf slot**, `8 * node + lane`; the cache's table of slots is indexed by it, so
-//! its address is known as soon as the node is tested, and can be fetched ahead.
+//! It is a **wide tree**: its **nodes** have up to eight **lanes**. A lane is empty, an inner node or a **leaf**: one
+//! patch. A leaf is named by its **leaf slot**, `8 * node + lane`; the cache's table of slots is indexed by it, so its
+//! address is known as soon as the node is tested, and can be fetched ahead.
 //!
 //! ```text
 //!   node, 192 + 32 bytes                 open node, on the stack
@@ -14,13 +14,14 @@
 //!
 //! # Invariants
 //! 1. A lane's box holds every box below it.
-//! 2. The test of a box is conservative against the triangle test ([`LatticeRay`](crate::grid::LatticeRay) has the argument), so a patch that a ray hits is visited.
-//! 3. The lanes of a node are visited in the order of their entry, to within two [places](crate::math::simd::place); those entered at exactly `t_max`
-//!    are visited too, so that ties are seen.
+//! 2. The test of a box is conservative against the triangle test ([`LatticeRay`](crate::grid::LatticeRay) has the
+//!    argument), so a patch that a ray hits is visited.
+//! 3. The lanes of a node are visited in the order of their entry, to within two [places](crate::math::simd::place);
+//!    those entered at exactly `t_max` are visited too, so that ties are seen.
 //! 4. No arrangement of boxes makes the tree deep or its build quadratic.
 //!
-//! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs). Read `traverse.rs` first;
-//! `front.rs` lets rays that are much alike begin further down.
+//! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs).
+//! Read `traverse.rs` first; `front.rs` lets rays that are much alike begin further down.
 
 mod build;
 mod collapse;
@@ -47,8 +48,8 @@ pub struct LeafRef {
 
 /// A ray's way from leaf to leaf.
 pub trait LeafWalk {
-    /// The next patch whose box the ray meets before `t_max`, the nearest of each node first. `prefetch` is called with a leaf's slot
-    /// when the leaf before it in the same node is handed out.
+    /// The next patch whose box the ray meets before `t_max`, the nearest of each node first. `prefetch` is called with
+    /// a leaf's slot when the leaf before it in the same node is handed out.
     fn nearest(&mut self, t_max: f32, prefetch: impl Fn(u32)) -> Option<LeafRef>;
 }
 
@@ -92,7 +93,8 @@ struct Nodes {
 /// use lazytess::math::{Bounds, simd::Portable};
 /// use lazytess::scene::accel::{TopLevel, TraversalStack};
 ///
-/// let boxes: Vec<Bounds> = (0..100).map(|x| 1000.0 * Vec3::X * x as f32).map(|p| Bounds { min: p, max: p + 100.0 }).collect();
+/// let corners = (0..100).map(|x| 1000.0 * Vec3::X * x as f32);
+/// let boxes: Vec<Bounds> = corners.map(|p| Bounds { min: p, max: p + 100.0 }).collect();
 /// let tree = TopLevel::build(&boxes, 1);
 /// let ray = LatticeRay::new(DVec3::new(-50.0, 50.0, 50.0), DVec3::X, f32::INFINITY, TriangleId::NONE);
 /// let mut order = vec![];

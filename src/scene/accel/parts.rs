@@ -1,9 +1,9 @@
-//! Dividing boxes into **parts** of neighbours, each small enough for a processor's cache: a part's tree is built by one
-//! thread, beside those of the other parts.
+//! Dividing boxes into **parts** of neighbours, each small enough for a processor's cache: a part's tree is built by
+//! one thread, beside those of the other parts.
 //!
 //! Boxes are divided in two by the least surface-area cost among [`N_BINS`] slabs of their centres (Wald 2007), and the
-//! halves again. A slab boundary that would leave less than an eighth on one side is passed over, for the median if need
-//! be, so that no arrangement of boxes takes more than a few passes.
+//! halves again. A slab boundary that would leave less than an eighth on one side is passed over, for the median if
+//! need be, so that no arrangement of boxes takes more than a few passes.
 
 use crate::math::Bounds;
 use glam::Vec3;

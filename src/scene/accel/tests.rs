@@ -155,7 +155,8 @@ fn occlusion_stops_at_the_first_hit() {
     assert_eq!(n_visits, 1);
 }
 
-/// The leaves that a ray visits from the root, and those that it visits from a bundle's front, each by their slots; `None` if there is no front.
+/// The leaves that a ray visits from the root, and those that it visits from a bundle's front, each by their slots;
+/// `None` if there is no front.
 struct FromFront<'a>(&'a TopLevel, &'a RayBounds, &'a LatticeRay);
 
 impl Task for FromFront<'_> {

@@ -57,8 +57,8 @@ impl TopLevel {
         AnyWalk { kernel, slabs, t_max: ray.t_max, nodes: self.nodes(), stack, n: 1, next: 0, node: 0, leaves: 0 }
     }
 
-    /// Calls `visit` for the patches whose boxes the ray meets, the nearest of each node first, until the rest lie beyond
-    /// `t_max`. It is given as [`LatticeRay::t_max`] and `visit` makes it smaller when it hits something.
+    /// Calls `visit` for the patches whose boxes the ray meets, the nearest of each node first, until the rest lie
+    /// beyond `t_max`. It is given as [`LatticeRay::t_max`] and `visit` makes it smaller when it hits something.
     pub fn closest<K: Kernel>(
         &self,
         kernel: K,
@@ -100,10 +100,12 @@ impl TopLevel {
 
 /// A ray's way through the tree, from leaf to leaf.
 ///
-/// The lanes of a node that the ray meets stay together, as their places in the order of entry; the nearest is looked for whenever
-/// the node's turn comes. So nothing is sorted, and what follows a node's test does not depend on how many lanes are met.
+/// The lanes of a node that the ray meets stay together, as their places in the order of entry; the nearest is looked
+/// for whenever the node's turn comes. So nothing is sorted, and what follows a node's test does not depend on how many
+/// lanes are met.
 ///
-/// It hands out leaves instead of calling back: code with vector instructions in a closure would be compiled without them.
+/// It hands out leaves instead of calling back: code with vector instructions in a closure would be compiled without
+/// them.
 pub struct Walk<'t, K: Kernel> {
     kernel: K,
     slabs: Slabs<K>,
@@ -167,10 +169,12 @@ impl<K: Kernel> LeafWalk for Walk<'_, K> {
 
 /// A ray's way through the tree in any order.
 ///
-/// What a processor guesses wrong most often is how many children a ray meets and what they are. So a node's leaves are handed
-/// out from a mask, and all inner children but one go onto the stack at once. Which node comes next is left to a branch: what
-/// follows a right guess need not wait for the test of the boxes. Measured at rate 16: occlusion rays on bigguy and monsterfrog
-/// 1.04 times as fast as from a stack of both, on trex 1.04 times; 0.97 times on the two where the next node was selected without a branch.
+/// What a processor guesses wrong most often is how many children a ray meets and what they are. So a node's leaves are
+/// handed out from a mask, and all inner children but one go onto the stack at once. Which node comes next is left to a
+/// branch: what follows a right guess need not wait for the test of the boxes. Measured at rate 16: occlusion rays on
+/// bigguy and monsterfrog
+/// 1.04 times as fast as from a stack of both, on trex 1.04 times; 0.97 times on the two where the next node was
+/// selected without a branch.
 pub struct AnyWalk<'t, K: Kernel> {
     kernel: K,
     slabs: Slabs<K>,
@@ -235,8 +239,8 @@ impl<K: Kernel> AnyWalk<'_, K> {
     }
 }
 
-/// What the tests of all nodes need of a ray: t of a plane p is `p * inv - origin * inv`. Made once: what stays in registers or near
-/// them is not spread over the lanes anew for every node.
+/// What the tests of all nodes need of a ray: t of a plane p is `p * inv - origin * inv`. Made once: what stays in
+/// registers or near them is not spread over the lanes anew for every node.
 struct Slabs<K: Kernel> {
     inv: [K::F; 3],
     /// `-origin * inv` for near and far planes.
@@ -261,7 +265,8 @@ impl<K: Kernel> Slabs<K> {
         }
     }
 
-    /// Where the ray enters a node's lanes, and where it leaves them, between 0 and `t_max`: it meets those that it does not leave before it enters.
+    /// Where the ray enters a node's lanes, and where it leaves them, between 0 and `t_max`: it meets those that it
+    /// does not leave before it enters.
     #[inline(always)]
     fn test(&self, k: K, boxes: &NodeBoxes, t_max: f32) -> (K::F, K::F) {
         let (mut enter, mut leave) = (k.splat(0.0), k.splat(t_max));

@@ -15,8 +15,8 @@ impl NodeBoxes {
 }
 
 impl TopLevel {
-    /// Calls `leaf` for every patch with its box, but for those in boxes that `enter` turns down. `enter` is asked about
-    /// boxes of several patches only.
+    /// Calls `leaf` for every patch with its box, but for those in boxes that `enter` turns down. `enter` is asked
+    /// about boxes of several patches only.
     pub fn visit(&self, mut enter: impl FnMut(&Bounds) -> bool, mut leaf: impl FnMut(PatchId, &Bounds)) {
         self.visit_boxes(|found, bounds| match found {
             Some(found) => {

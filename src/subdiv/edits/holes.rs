@@ -1,9 +1,9 @@
 //! Parts of patches that `t faceedit` takes away.
 //!
-//! A **hole** is a cell of the 2^level by 2^level cells of a patch. The surface over it is still evaluated, since its border
-//! belongs to the faces around it; only its grid cells are left out. So that holes end between grid cells, and between
-//! whole pieces, such a patch has a multiple of 8 2^level cells along u and v, and an edge that a hole touches has a rate
-//! that 2^level divides.
+//! A **hole** is a cell of the 2^level by 2^level cells of a patch. The surface over it is still evaluated, since its
+//! border belongs to the faces around it; only its grid cells are left out. So that holes end between grid cells, and
+//! between whole pieces, such a patch has a multiple of 8 2^level cells along u and v, and an edge that a hole touches
+//! has a rate that 2^level divides.
 
 use crate::error::{Error, Result};
 use crate::ids::{FaceId, PatchId};

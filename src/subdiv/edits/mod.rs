@@ -1,9 +1,9 @@
 //! Hierarchical edits: patches that are refined until their edits have taken effect.
 //!
-//! An edit of level l changes the mesh after l steps, so that up to there no plan holds: plans are shared, edits are not. A
-//! patch **under edits** (one of its face's neighbours has an edit inside) keeps an [`EditTree`] instead: a quadtree that
-//! splits while an edit is **pending** in the ring, with ring points computed once. Where it ends, an ordinary node of
-//! the [`PlanLibrary`] goes on, and nothing is left to know about edits. A **hole** is a quadtree cell
+//! An edit of level l changes the mesh after l steps, so that up to there no plan holds: plans are shared, edits are
+//! not. A patch **under edits** (one of its face's neighbours has an edit inside) keeps an [`EditTree`] instead: a
+//! quadtree that splits while an edit is **pending** in the ring, with ring points computed once. Where it ends, an
+//! ordinary node of the [`PlanLibrary`] goes on, and nothing is left to know about edits. A **hole** is a quadtree cell
 //! without surface.
 //!
 //! ```text

@@ -32,8 +32,8 @@ struct EditedFace {
 
 /// A small mesh under edits. As a ring, it holds all faces at the target's corners, those of other sheets included.
 ///
-/// Every edit that moves a point of the ring of a quarter lies in a child of one of these faces, for those children are all
-/// faces at all the points of that ring. So a ring without pending edits stays without.
+/// Every edit that moves a point of the ring of a quarter lies in a child of one of these faces, for those children are
+/// all faces at all the points of that ring. So a ring without pending edits stays without.
 pub(super) struct EditedMesh {
     pub mesh: LocalMesh,
     pub points: Vec<Point>,
@@ -116,8 +116,8 @@ impl EditedMesh {
         (0..self.mesh.n_half_edges() as u32).map(child).collect()
     }
 
-    /// The edges after a step: halves of an edge are told apart by their vertex, and those of one that leads back to its
-    /// vertex, which has one sheet only, by their order.
+    /// The edges after a step: halves of an edge are told apart by their vertex, and those of one that leads back to
+    /// its vertex, which has one sheet only, by their order.
     fn child_edges(&self) -> Vec<u32> {
         let mut numbers = FxHashMap::default();
         let mut number = |key: (u32, u32)| {
@@ -216,8 +216,8 @@ fn sources_of_half_edges<M: HalfEdges>(source: &M, x: &Extracted) -> impl Iterat
     })
 }
 
-/// Makes the middles of a non-manifold edge, of which refining gives every face its own, one vertex again: edits of it in one
-/// face concern them all.
+/// Makes the middles of a non-manifold edge, of which refining gives every face its own, one vertex again: edits of it
+/// in one face concern them all.
 fn join_sheets(before: &EditedMesh, origin: &[Origin], refined: &mut LocalMesh) {
     let mut known: FxHashMap<u32, u32> = FxHashMap::default();
     let mut joined: Vec<u32> = (0..origin.len() as u32).collect();

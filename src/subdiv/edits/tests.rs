@@ -13,7 +13,8 @@ fn grid_points() -> Vec<[f64; 2]> {
     (0..=16).flat_map(|j| (0..=16).map(move |i| [f64::from(i) / 16.0, f64::from(j) / 16.0])).collect()
 }
 
-/// Panics unless surface and refinement have the same holes, positions and derivatives; returns how many points were seen.
+/// Panics unless surface and refinement have the same holes, positions and derivatives; returns how many points were
+/// seen.
 fn assert_same_surface(mesh: &ControlMesh) -> usize {
     let surface = Surface::new(mesh, 1).unwrap();
     let reference = RefinedMesh::from_control(mesh);

@@ -11,8 +11,8 @@ use std::f64::consts::TAU;
 pub enum Tangents {
     /// Derivatives with respect to u and v of the patch, one-sided at creases and boundaries.
     Derivatives(DVec3, DVec3),
-    /// Unit tangents in the directions of u and v: at smooth vertices of a valence other than 4 the derivatives are zero
-    /// or infinite.
+    /// Unit tangents in the directions of u and v: at smooth vertices of a valence other than 4 the derivatives are
+    /// zero or infinite.
     Directions(DVec3, DVec3),
     /// None from a mask: darts, valence 2, and creases and corners whose side has an unusual number of quads.
     Unknown,
@@ -38,7 +38,8 @@ enum AlongEdges {
 impl RefinedMesh<'_> {
     /// The limit of corner `k` of a face, with tangents of that face's side.
     ///
-    /// None if the masks do not hold yet (semi-sharp edges, edits to come, faces that are no quads around the vertex): refine.
+    /// None if the masks do not hold yet (semi-sharp edges, edits to come, faces that are no quads around the vertex):
+    /// refine.
     pub fn limit(&self, face: usize, k: usize) -> Option<Sample> {
         let star = self.star(self.corners(face)[k].vertex as usize);
         if !star.is_at_rest() {
@@ -119,12 +120,13 @@ impl Star<'_> {
         }
     }
 
-    /// Derivatives along and across a crease for its side of two quads: along the edge that leaves `first`, and along the
-    /// edge between the quads.
+    /// Derivatives along and across a crease for its side of two quads: along the edge that leaves `first`, and along
+    /// the edge between the quads.
     fn crease_side(&self, first: &Sector, second: &Sector) -> Option<(DVec3, DVec3)> {
         let (v, a, c, b) = (self.position(), first.next, first.prev, second.prev);
         let across = (4.0 * (c - v) + (first.diagonal - a) + (second.diagonal - b)) / 6.0;
-        // At a fin, one sharp edge may be both borders of a side, and then the other pulls at the crease from elsewhere.
+        // At a fin, one sharp edge may be both borders of a side, and then the other pulls at the crease from
+        // elsewhere.
         let is_whole_side =
             self.is_sharp(first.next_edge) && self.is_sharp(second.prev_edge) && first.next_edge != second.prev_edge;
         is_whole_side.then_some(((a - b) / 2.0, across))

@@ -16,9 +16,9 @@ type Wanted = (usize, [f64; 2]);
 impl RefinedMesh<'_> {
     /// The limit surface of patch (`face`, `sub`) at (u, v) in [0, 1]².
     ///
-    /// None where there is no surface, as in holes. The time grows with the number of halvings it takes to reach (u, v): a
-    /// multiple of 1/8 takes three, any other number up to 40. Where edits make a crease or the border of a hole inside the
-    /// patch, the point belongs to the cell with the larger u and v.
+    /// None where there is no surface, as in holes. The time grows with the number of halvings it takes to reach (u,
+    /// v): a multiple of 1/8 takes three, any other number up to 40. Where edits make a crease or the border of a hole
+    /// inside the patch, the point belongs to the cell with the larger u and v.
     ///
     /// # Panics
     /// If a step has been made already, or the mesh has no such patch.

@@ -72,7 +72,8 @@ struct Beside {
 }
 
 impl<'a> RefinedMesh<'a> {
-    /// The mesh after one step, edits of that level applied. Vertex v stays number v; edge points, then face points follow.
+    /// The mesh after one step, edits of that level applied. Vertex v stays number v; edge points, then face points
+    /// follow.
     pub fn refine(&self) -> RefinedMesh<'a> {
         let halves = self.half_sharpness();
         let face_points: Vec<DVec3> = (0..self.faces.len()).map(|f| self.face_point(f)).collect();
