@@ -41,10 +41,6 @@ id!(
     FaceId
 );
 id!(
-    /// A half-edge: the side of an edge that belongs to one face.
-    HalfEdgeId
-);
-id!(
     /// A patch: a quad of the limit surface. One per quad face, n per n-gon; dense per mesh.
     PatchId
 );

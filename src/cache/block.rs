@@ -20,11 +20,6 @@ impl BlockLayout {
     /// The most children that a block can have.
     pub const MAX_CHILDREN: usize = MAX_WORD_LINES * WORDS_PER_LINE;
 
-    /// Bytes that the block takes in the cache.
-    pub fn bytes_in_cache(self) -> usize {
-        self.lines() * super::memory::LINE
-    }
-
     /// # Panics
     /// If there are too many children.
     pub(super) fn word_lines(self) -> usize {

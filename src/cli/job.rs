@@ -136,10 +136,8 @@ impl<'a> RenderScene<'a> {
         for (mesh, description) in world.meshes().iter().zip(&self.scene.meshes) {
             let (n, file) = (mesh.surface().topology().idle_creases(), description.file.display());
             if n > 0 {
-                eprintln!(
-                    "lazytess: warning: {file}: {n} crease tags name vertices that share no edge, and do nothing; tags \
-                     count from 0"
-                );
+                let tags = if n == 1 { "1 crease tag names".to_owned() } else { format!("{n} crease tags name") };
+                eprintln!("lazytess: warning: {file}: {tags} vertices that share no edge; tags count from 0");
             }
         }
     }

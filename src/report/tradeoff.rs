@@ -108,8 +108,8 @@ const HEADINGS: [&str; 15] = [
 ];
 
 impl Display for Tradeoff {
-    /// A Markdown table, a line for each run. `above` is the share of pixels beyond the tolerance, in percent; `worst
-    /// tile` the mean difference of the 32 x 32 pixels where it is largest.
+    /// A Markdown table, a line for each run. `above` is the share of pixels beyond the tolerance from the full render
+    /// at the same rate, in percent; `worst tile` the mean difference of the 32 x 32 pixels where it is largest.
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         writeln!(f, "| {} |", HEADINGS.join(" | "))?;
         writeln!(f, "|{}", "---|".repeat(HEADINGS.len()))?;
