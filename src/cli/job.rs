@@ -102,8 +102,11 @@ impl<'a> RenderScene<'a> {
             tables += build.tables;
         }
         let needs = RenderNeeds::new(held + PREPARING_LEAVES, tables, 0, self.settings, threads);
-        let smallest = peak.max(needs.smallest_budget());
-        if smallest > budget { Err(too_small_for("prepare the meshes", budget, smallest)) } else { Ok(()) }
+        let (what, least) = match needs.smallest_budget() {
+            holding if holding > peak => ("hold the scene, the picture and what threads need", holding),
+            _ => ("prepare the meshes", peak),
+        };
+        if least > budget { Err(too_small_for(what, budget, least)) } else { Ok(()) }
     }
 
     /// Prepares meshes that have been read, and the camera that frames them.
