@@ -22,7 +22,7 @@ use std::ops::AddAssign;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Patches whose horizons are remembered at most: 2 MiB. With a quarter of them, occlusion, diffuse and shuffled rays
-/// on meshes of 30,000 faces (38,000 to 47,000 patches; rates 8 and 16) ran at 0.87 to 1.00 of the speed.
+/// on meshes of 30,000 faces (38,000 to 47,000 patches; rates 8 and 16) ran at 0.82 to 1.00 of the speed.
 const MOST_HORIZONS: usize = 1 << 16;
 
 /// Patches whose skylines are remembered at most: 2.5 MiB. Four times as many gain nothing more there.
