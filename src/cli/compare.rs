@@ -35,9 +35,7 @@ pub struct CompareArgs {
 impl CompareArgs {
     /// Compares, prints, and judges if asked to.
     pub fn run(&self) -> Result<()> {
-        if let Some(path) = &self.diff {
-            check_outputs(&[Some(path)], &[&self.a, &self.b])?;
-        }
+        check_outputs(&[self.diff.as_deref()], &[&self.a, &self.b])?;
         let (a, b) = (read_rgb(&self.a)?, read_rgb(&self.b)?);
         let (comparison, map) = compare(borrow(&a)?, borrow(&b)?)?;
         let json = serde_json::to_string_pretty(&comparison).expect("plain numbers have a JSON form");

@@ -1,10 +1,10 @@
 //! `lazytess generate`: control meshes of this program's making, as OBJ.
 
-use super::interrupt::cancel_on_interrupt;
+use super::interrupt::{cancel_on_interrupt, unless_interrupted};
 use super::outputs::check_outputs;
 use super::progress::Progress;
 use super::values::decimal_count;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::{Error, Result};
 use crate::ids::VertexId;
 use crate::io::obj_write::{ObjWriter, write_obj};
 use crate::mesh::shapes::{self, Crowd, Ground, NamedShape, Scan};
@@ -79,13 +79,7 @@ impl GenerateArgs {
             }
         });
         progress.finish();
-        match written {
-            Err(_) if cancel.load(Ordering::Relaxed) => {
-                let message = format!("interrupted: {} was not written", self.output.display());
-                Err(Error::new(ErrorKind::Interrupted, message))
-            }
-            other => other,
-        }
+        unless_interrupted(written, &cancel, &self.output)
     }
 
     fn job(&self) -> Result<Job> {

@@ -1,11 +1,11 @@
 //! `lazytess tessellate`: the triangles themselves.
 
 use super::input::EditArgs;
-use super::interrupt::cancel_on_interrupt;
+use super::interrupt::{cancel_on_interrupt, unless_interrupted};
 use super::outputs::check_outputs;
 use super::run_options::RunArgs;
 use super::values::fixed_rate;
-use crate::error::{Error, ErrorKind, Result};
+use crate::error::Result;
 use crate::io::write::write_whole;
 use crate::scene::rate::DicingRate;
 use crate::scene::tessellate::tessellate;
@@ -68,12 +68,6 @@ impl TessellateArgs {
             )?;
             out.write_all(&faces)
         });
-        match written {
-            Err(_) if cancel.load(Ordering::Relaxed) => {
-                let message = format!("interrupted: {} was not written", self.output.display());
-                Err(Error::new(ErrorKind::Interrupted, message))
-            }
-            other => other,
-        }
+        unless_interrupted(written, &cancel, &self.output)
     }
 }

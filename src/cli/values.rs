@@ -112,19 +112,15 @@ pub fn fixed_rate(text: &str) -> Result<u32, String> {
 /// How many of something there may be very many of, typed like `100000`, `20k`, `10M`; K is 1000 here.
 pub fn decimal_count(text: &str) -> Result<u64, String> {
     let wrong = || format!("'{text}' is no count: write a whole number from 1 up, or one with k, M or G such as 20k");
-    let (number, thousands) = match text.strip_suffix(|unit: char| unit.is_ascii_alphabetic()) {
-        None => (text, 0),
-        Some(number) => (
-            number,
-            match &text[number.len()..] {
-                "k" | "K" => 1,
-                "m" | "M" => 2,
-                "g" | "G" => 3,
-                _ => return Err(wrong()),
-            },
-        ),
+    let number = text.trim_end_matches(|unit: char| unit.is_ascii_alphabetic());
+    let unit = match &text[number.len()..] {
+        "" => 1,
+        "k" | "K" => 1000,
+        "M" => 1_000_000,
+        "G" => 1_000_000_000,
+        _ => return Err(wrong()),
     };
-    let count = number.parse::<u64>().ok().and_then(|n| n.checked_mul(1000u64.pow(thousands)));
+    let count = number.parse::<u64>().ok().and_then(|n| n.checked_mul(unit));
     count.filter(|&n| n > 0).ok_or_else(wrong)
 }
 

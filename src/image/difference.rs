@@ -3,6 +3,10 @@
 use super::color_map::viridis;
 use serde::Serialize;
 
+/// A difference of two display values in single precision, each of which went to linear light and back, errs by less
+/// than this: pictures of 8 or 16 bits have differences of whole steps.
+const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
+
 /// Side of the tiles among which the worst is sought, in pixels.
 pub const TILE_SIDE: usize = 32;
 
@@ -101,10 +105,6 @@ pub fn psnr(a: &[[f32; 3]], b: &[[f32; 3]]) -> Option<f64> {
 pub(super) fn largest_difference(a: [f32; 3], b: [f32; 3]) -> f32 {
     (0..3).fold(0.0, |max, i| max.max((a[i] - b[i]).abs()))
 }
-
-/// A difference of two display values in single precision, each of which went to linear light and back, errs by less
-/// than this: pictures of 8 or 16 bits have differences of whole steps.
-const ROUNDING: f32 = 1.0 / (1 << 20) as f32;
 
 /// Whether a difference is above a limit, roundings aside.
 pub fn is_above(difference: f32, limit: f32) -> bool {
