@@ -55,6 +55,12 @@ impl Pins {
         let used = &self.words[..self.n_used.load(Ordering::Relaxed)];
         used.iter().map(|word| word.load(Ordering::Acquire)).any(|pin| pin > UNPINNED && pin < age)
     }
+
+    /// Whether a pin other than the `idx`-th stands at an age before `age`; it may have moved on meanwhile.
+    fn another_before(&self, idx: usize, age: u64) -> bool {
+        let used = self.words[..self.n_used.load(Ordering::Relaxed)].iter().enumerate().filter(|(i, _)| *i != idx);
+        used.map(|(_, word)| word.load(Ordering::Relaxed)).any(|pin| pin > UNPINNED && pin < age)
+    }
 }
 
 /// A thread's right to read the cache. Neither `Send` nor `Sync`.
@@ -74,7 +80,7 @@ pub struct Pin<'c> {
     /// Bits of a slot word of which one is set in those blocks.
     kept_bits: u64,
     /// Whether a block of the last visit found no place because of another pin.
-    pub(super) met_a_pin: Cell<bool>,
+    met_a_pin: Cell<bool>,
     pub(super) scratch: Scratch,
     /// Tables that were gone when the scratch was last empty.
     n_tables_gone: usize,
@@ -293,6 +299,14 @@ impl<'p> Visit<'p> {
             tag: self.tag(),
             #[cfg(loom)]
             shared: Some((ring, place)),
+        }
+    }
+
+    /// Notes that a block found no place because of a pin, if it was not this one's alone.
+    pub(super) fn note_pinned(&self) {
+        let Pin { cache, idx: Some(idx), met_a_pin, .. } = self.pin else { return };
+        if cache.pins.another_before(*idx, cache.ring.oldest_allowing_advance()) {
+            met_a_pin.set(true);
         }
     }
 

@@ -126,6 +126,16 @@ impl Ring {
         fits(before).then_some((before & USED_MASK) as usize)
     }
 
+    /// The least age of a pin that lets the segment of age `next` become the current one.
+    fn oldest_allowing(&self, next: u64) -> u64 {
+        next.saturating_sub(self.grace)
+    }
+
+    /// The least age of a pin that lets the head move on.
+    pub(super) fn oldest_allowing_advance(&self) -> u64 {
+        self.oldest_allowing(self.head() + 1)
+    }
+
     /// Makes the segment after `age` the current one, unless a pin can still read what is in it. Several threads may do
     /// this at once; each step is one that the others may have taken already.
     fn advance(&self, age: u64, pins: &Pins) -> bool {
@@ -135,7 +145,7 @@ impl Ring {
         }
         // Invariant 4: the caller's own pin stands where it may if this passes, so that its fence is one for this scan,
         // too.
-        if pins.any_before(next.saturating_sub(self.grace)) {
+        if pins.any_before(self.oldest_allowing(next)) {
             return false;
         }
         // `Relaxed`: a cursor guards no memory but its own, and who sees the new head finds it reset by this thread or

@@ -197,11 +197,13 @@ impl<'v> Ticket<'v> {
 
     /// Builds a block that finds no place in the cache for this thread alone.
     fn bypass(&mut self, why: NoPlace, layout: BlockLayout, encode: impl FnOnce(&mut [u8])) -> Block<'v> {
-        count(match why {
-            NoPlace::TooLarge => &self.counters().bypassed_too_large,
-            NoPlace::Pinned => &self.counters().bypassed_pinned,
-        });
-        self.visit.pin.met_a_pin.set(why == NoPlace::Pinned || self.visit.pin.met_a_pin.get());
+        match why {
+            NoPlace::TooLarge => count(&self.counters().bypassed_too_large),
+            NoPlace::Pinned => {
+                count(&self.counters().bypassed_pinned);
+                self.visit.note_pinned();
+            }
+        }
         let block = self.visit.private_block(self.key, layout, encode);
         self.end_build(false);
         self.give_back(|_| EVICTED);

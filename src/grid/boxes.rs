@@ -71,11 +71,6 @@ impl LaneBoxes {
     /// To be overwritten.
     pub const UNSET: Self = Self { low: [[0; 16]; 3], high: [[0; 16]; 3] };
 
-    /// The same box in every lane.
-    pub fn splat(b: IntegerBox) -> Self {
-        Self { low: b[0].map(|x| [x; 16]), high: b[1].map(|x| [x; 16]) }
-    }
-
     /// Replaces a lane's box.
     pub fn set(&mut self, lane: usize, b: IntegerBox) {
         for (k, (low, high)) in b[0].into_iter().zip(b[1]).enumerate() {

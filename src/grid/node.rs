@@ -41,16 +41,22 @@ fn encode(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &mut [u8])
     debug_assert!(children.iter().all(|n| (1..=4).contains(n)));
     let [n_u, n_v] = children.map(usize::from);
     assert_eq!(bounds.len(), n_u * n_v, "one box for each child");
-    let filled = bounds.iter().filter(|b| !b.is_empty());
-    let whole = filled.map(integer_box).reduce(union).expect("a node has children");
-    let lane = |c: usize| 4 * (c / n_u) + c % n_u;
-    let mut boxes = LaneBoxes::splat(whole);
-    for (c, b) in bounds.iter().enumerate().filter(|c| !c.1.is_empty()) {
-        boxes.set(lane(c), integer_box(b));
+    let children_and_lanes = || {
+        bounds
+            .chunks_exact(n_u)
+            .enumerate()
+            .flat_map(|(b, row)| row.iter().enumerate().map(move |(a, of)| (of, 4 * b + a)))
+    };
+    let (mut whole, mut boxes) = ([[i32::MAX; 3], [i32::MIN; 3]], LaneBoxes::UNSET);
+    for (of, lane) in children_and_lanes().filter(|(of, _)| !of.is_empty()) {
+        let child = integer_box(of);
+        boxes.set(lane, child);
+        whole = union(whole, child);
     }
+    assert!(whole[0][0] <= whole[1][0], "a node has children");
     let head: &mut Head = bytemuck::from_bytes_mut(out);
     head.set(whole, &boxes, children, cells, [0; 2], NO_FORMAT);
-    (0..bounds.len()).filter(|&c| bounds[c].is_empty()).for_each(|c| head.turn_inside_out(lane(c)));
+    children_and_lanes().filter(|(of, _)| of.is_empty()).for_each(|(_, lane)| head.turn_inside_out(lane));
 }
 
 /// The box rounded outwards to lattice points, and cut to the cube that vertices lie in.

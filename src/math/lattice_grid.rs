@@ -72,11 +72,12 @@ impl LatticeGrid {
         self.axes[axis][j * self.stride..].first_chunk().expect("room after the last row")
     }
 
-    /// Takes points and rounds them to whole numbers.
-    pub fn round(&mut self, points: &PointGrid, rounding: Rounding) {
+    /// Takes points and rounds them to whole numbers. Says whether [`Rounding::near`] may find any of them: if not, it
+    /// finds none.
+    pub fn round(&mut self, points: &PointGrid, rounding: Rounding) -> bool {
         let [columns, rows] = points.size();
         self.reset(columns, rows);
-        simd::run(Round { points, rounding, grid: self });
+        simd::run(Round { points, rounding, grid: self })
     }
 }
 
@@ -154,21 +155,29 @@ struct Round<'a> {
     grid: &'a mut LatticeGrid,
 }
 
+/// What one operation errs by at most: coordinates are below 2^25.
+const ROUNDING_ERROR: f64 = 1.0 / (1 << 28) as f64;
+
 impl Task for Round<'_> {
-    type Output = ();
+    type Output = bool;
     #[inline(always)]
-    fn run<K: Kernel>(self, k: K) {
+    fn run<K: Kernel>(self, k: K) -> bool {
         let LatticeGrid { columns, rows, stride, axes } = self.grid;
         let shift = k.splat4(self.rounding.shift);
+        // Of everything there is room for, points or not: nearly always none of it is near a boundary.
+        let mut farthest = k.splat4(0.0);
         for (axis, out) in axes.iter_mut().enumerate() {
             let out = &mut out[..*rows * *stride];
             for (out, x) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(self.points.axis(axis).as_chunks().0) {
-                *out = k.nearest4(k.add4(k.load4(x), shift));
+                let x = k.add4(k.load4(x), shift);
+                *out = k.nearest4(x);
+                farthest = k.max4(k.abs4(k.sub4(x, k.round4(x))), farthest);
             }
             for row in out.chunks_exact_mut(*stride) {
                 row[*columns] = row[*columns - 1];
             }
         }
+        k.lt4(k.splat4(0.5 - self.rounding.guard - ROUNDING_ERROR), farthest) != 0
     }
 }
 
@@ -185,7 +194,7 @@ mod tests {
             points.reset(columns, 3);
             (0..columns * 3).for_each(|k| points.set(k % columns, k / columns, point(k)));
             let mut grid = LatticeGrid::default();
-            grid.round(&points, rounding);
+            assert!(grid.round(&points, rounding), "y lies on a boundary");
             for k in 0..columns * 3 {
                 let (i, j) = (k % columns, k / columns);
                 assert_eq!(grid.point(i, j), point(k).map(|x| (x + 0.25).round_ties_even() as i32));
@@ -193,6 +202,24 @@ mod tests {
             }
             assert_eq!(rounding.near(&points, [0, 1], 0, columns), (1 << columns) - 1, "y lies on a boundary");
             assert_eq!(grid.points().count(), columns * 3);
+        }
+    }
+
+    #[test]
+    fn whatever_is_near_a_boundary_is_told_while_rounding() {
+        let rounding = Rounding { shift: 1.0 / 3.0, guard: 1e-6 };
+        let mut points = PointGrid::default();
+        points.reset(9, 9);
+        for (place, whole) in (0..81).flat_map(|place| [-8_000_000.0, -1.0, 0.0, 8_000_000.0].map(|x| (place, x))) {
+            for (distance, is_near) in [(0.999e-6, true), (-0.999e-6, true), (1.1e-6, false), (-1.1e-6, false)] {
+                (0..81).for_each(|k| points.set(k % 9, k / 9, [0.25, 7.5, -3.25]));
+                let mut p = [0.25, 7.5, -3.25];
+                p[place % 3] = whole + 0.5 - rounding.shift + distance;
+                points.set(place % 9, place / 9, p);
+                let mut grid = LatticeGrid::default();
+                assert_eq!(grid.round(&points, rounding), is_near, "{place}, {whole}, {distance}");
+                assert_eq!(rounding.near(&points, [place % 9, place / 9], 0, 1) == 1, is_near);
+            }
         }
     }
 

@@ -79,7 +79,7 @@ impl Surface {
 
     /// [`patch_rates`](Self::patch_rates) for the same rate everywhere.
     pub fn uniform_rates(&self, patch: PatchId, n: u32) -> PatchRates {
-        if self.topology().all_quads() && !self.edited().has_holes() {
+        if !self.edited().has_holes() && self.topology().is_among_quads(self.face_of(patch).0) {
             return PatchRates::new([n.clamp(1, MAX_RATE); 4], 1);
         }
         self.rates_by(patch, &|_| n, &|_, _| n)
@@ -216,14 +216,15 @@ impl Dicer {
         let vs = parameters([j0, j1], rates.n_v);
         let cells = Some([rates.n_u, rates.n_v]);
         surface.grid(&mut self.points[lane], &mut self.evaluator, cells, us, vs, &mut self.out);
-        out.round(&self.out, ROUNDING);
+        let has_near = out.round(&self.out, ROUNDING);
         for side in [0, 2, 3, 1] {
-            self.settle_side(surface, patch, rates, side, [[i0, i1], [j0, j1]], out);
+            self.settle_side(surface, patch, rates, side, [[i0, i1], [j0, j1]], has_near, out);
         }
     }
 
     /// Makes the vertices of a side what both of its patches agree on, if the part `cells` (along u and v) touches that
-    /// side.
+    /// side. `has_near`: whether any of them may be within the guard of a rounding boundary.
+    #[allow(clippy::too_many_arguments)]
     fn settle_side(
         &mut self,
         surface: &Surface,
@@ -231,6 +232,7 @@ impl Dicer {
         rates: &PatchRates,
         side: usize,
         cells: [[u32; 2]; 2],
+        has_near: bool,
         out: &mut LatticeGrid,
     ) {
         let (axis, is_far) = (side % 2, side == 1 || side == 2);
@@ -252,6 +254,9 @@ impl Dicer {
                 let [i, j] = place(along);
                 out.set(i, j, self.side[(index(along) - index(0)) as usize]);
             }
+            return;
+        }
+        if !has_near {
             return;
         }
         for start in (0..n_points).step_by(MOST_NEAR) {

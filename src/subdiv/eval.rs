@@ -340,11 +340,12 @@ impl Evaluator {
     ) {
         let (n_u, n_v) = (target.us.1 - target.us.0, target.vs.1 - target.vs.0);
         for k in 0..4 {
-            let Some(limit) = limits.get(k) else { continue };
             let (x, y) = quarter(k);
             let (i, j) = (if x == 0.0 { 0 } else { n_u - 1 }, if y == 0.0 { 0 } else { n_v - 1 });
-            let is_wanted = self.params[target.us.0 + i] == x && self.params[target.vs.0 + j] == y;
-            if let (true, Some(row)) = (is_wanted, limit.position()) {
+            if self.params[target.us.0 + i] != x || self.params[target.vs.0 + j] != y {
+                continue;
+            }
+            if let Some(row) = limits.get(k).and_then(|limit| limit.position()) {
                 let p = one_product(library.rows(), row, 0, ring);
                 out.set(target.first[0] + i, target.first[1] + j, p.to_vec().to_array());
             }

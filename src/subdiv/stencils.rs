@@ -38,20 +38,25 @@ static WEIGHTS: [OnceLock<[Weights; 4]>; MOST_EDGES + 1] = [const { OnceLock::ne
 /// edges.
 pub(super) fn weights(n_ring: usize, apex: usize) -> Option<&'static [[f64; LANES]]> {
     let n = (n_ring - 1 - N_OUTER) / 2;
-    Some(&WEIGHTS.get(n)?.get_or_init(|| [0, 1, 2, 3].map(|apex| find(n, apex)))[apex])
+    Some(&WEIGHTS.get(n)?.get_or_init(|| find(n))[apex])
 }
 
-/// Four weights of each point at a time go where the coordinates of points go elsewhere.
-fn find(n: usize, apex: usize) -> Weights {
+/// The weights for each corner that may be the apex. Four weights of each point at a time go where the coordinates of
+/// points go elsewhere.
+fn find(n: usize) -> [Weights; 4] {
     let n_ring = 1 + 2 * n + N_OUTER;
-    let mut out = vec![[0.0; LANES]; SIDE * FOURS * n_ring];
+    let mut out = [0; 4].map(|_| vec![[0.0; LANES]; SIDE * FOURS * n_ring]);
     for first in (0..n_ring).step_by(4) {
         let unit = |i: usize| Point(std::array::from_fn(|lane| f64::from(u8::from(first + lane == i))));
         let ring: Vec<Point> = (0..n_ring).map(unit).collect();
-        for (j, i) in (0..SIDE).flat_map(|j| (0..FOURS * LANES).map(move |i| (j, i))) {
-            let point = canonical_point(n, &ring, from_apex(apex, [i.min(SIDE - 1), j]));
-            for lane in 0..4.min(n_ring - first) {
-                out[(j * FOURS + i / LANES) * n_ring + first + lane][i % LANES] = point.0[lane];
+        let points: [[Point; SIDE]; SIDE] =
+            std::array::from_fn(|x| std::array::from_fn(|y| canonical_point(n, &ring, [x, y])));
+        for (apex, out) in out.iter_mut().enumerate() {
+            for (j, i) in (0..SIDE).flat_map(|j| (0..FOURS * LANES).map(move |i| (j, i))) {
+                let [x, y] = from_apex(apex, [i.min(SIDE - 1), j]);
+                for lane in 0..4.min(n_ring - first) {
+                    out[(j * FOURS + i / LANES) * n_ring + first + lane][i % LANES] = points[x][y].0[lane];
+                }
             }
         }
     }

@@ -36,6 +36,8 @@ pub struct Topology {
     nonmanifold_vertex_owner: FxHashMap<u32, u32>,
     /// A bit per face without surface, if there is any.
     hidden: Option<Vec<u64>>,
+    /// A bit per face that [`touches_polygon`](Self::touches_polygon) with any of its edges; none if all are quads.
+    beside_polygon: Vec<u64>,
     /// How sharpness decays.
     pub crease_method: CreaseMethod,
     /// Edge weights beside triangles.
@@ -90,6 +92,7 @@ impl Topology {
             nonmanifold_edge_owner: FxHashMap::default(),
             nonmanifold_vertex_owner: FxHashMap::default(),
             hidden: None,
+            beside_polygon: Vec::new(),
             crease_method: mesh.crease_method,
             triangles: mesh.triangles,
             idle_creases: 0,
@@ -104,6 +107,7 @@ impl Topology {
         if mesh.edits.iter().any(Edit::is_refined) {
             topology.separate_passages();
         }
+        topology.beside_polygon = topology.faces_beside_polygons();
         topology.edit_edges(mesh);
         topology.tag_vertices(mesh, &nonmanifold, n_threads);
         topology.edit_vertices(mesh);
@@ -429,7 +433,31 @@ impl Topology {
         fan.spokes.into_iter().filter(visible).min().unwrap_or(h)
     }
 
-    /// Whether a face that is no quad lies along the edge of `h`, on either side.
+    fn faces_beside_polygons(&self) -> Vec<u64> {
+        if self.all_quads() {
+            return Vec::new();
+        }
+        let mut bits = vec![0; self.n_faces() / 64 + 1];
+        self.nonmanifold_edge_owner.keys().for_each(|&h| set_bit(&mut bits, self.faces.face(h)));
+        for face in 0..self.n_faces() as u32 {
+            let (first, n) = self.faces.corners(face);
+            if n != 4 {
+                set_bit(&mut bits, face);
+                let twins = self.twin[first as usize..][..n as usize].iter().filter(|&&twin| twin != NONE);
+                twins.for_each(|&twin| set_bit(&mut bits, self.faces.face(twin)));
+            }
+        }
+        bits
+    }
+
+    /// Whether the face is a quad of which no edge [`touches_polygon`](Self::touches_polygon).
+    #[inline]
+    pub fn is_among_quads(&self, face: FaceId) -> bool {
+        self.all_quads() || !get_bit(&self.beside_polygon, face.0)
+    }
+
+    /// Whether a face that is no quad lies along the edge of `h`, on either side, or may do so: where more than two
+    /// faces meet.
     pub fn touches_polygon(&self, h: u32) -> bool {
         let is_polygon = |h: u32| self.faces.corners_at(h).1 != 4;
         let twin = self.twin[h as usize];
@@ -463,7 +491,8 @@ impl Topology {
         let maps = 8 * (self.edge_sharpness.capacity() + self.vertex_sharpness.capacity())
             + 8 * (self.nonmanifold_edge_owner.capacity() + self.nonmanifold_vertex_owner.capacity())
             + 48 * self.nonmanifold_tags.capacity();
-        let bits = 8 * (self.tagged.len() + self.hidden.as_ref().map_or(0, Vec::len));
+        let hidden = self.hidden.as_ref().map_or(0, Vec::len);
+        let bits = 8 * (self.tagged.len() + self.beside_polygon.len() + hidden);
         self.faces.bytes() + 4 * (self.vertex.len() + self.twin.len()) + bits + maps
     }
 

@@ -201,6 +201,10 @@ impl Kernel for Avx2 {
         in_registers!(_mm256_floor_pd(x))
     }
     #[inline(always)]
+    fn round4(self, x: __m256d) -> __m256d {
+        in_registers!(_mm256_round_pd::<{ _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }>(x))
+    }
+    #[inline(always)]
     fn lt4(self, a: __m256d, b: __m256d) -> u32 {
         in_registers!(_mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a, b)) as u32)
     }

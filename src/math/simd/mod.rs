@@ -108,6 +108,8 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn floats_of(self, x: Self::D) -> Self::F;
     /// Lanewise the greatest whole number that is not above.
     fn floor4(self, x: Self::D) -> Self::D;
+    /// Lanewise the nearest whole number, the even one of two.
+    fn round4(self, x: Self::D) -> Self::D;
     /// Bit k is set where `a < b` in lane k.
     fn lt4(self, a: Self::D, b: Self::D) -> u32;
     /// The nearest integers, the even one of two; numbers are below 2^31 in magnitude.

@@ -169,6 +169,10 @@ impl Kernel for Portable {
         x.map(f64::floor)
     }
     #[inline(always)]
+    fn round4(self, x: [f64; 4]) -> [f64; 4] {
+        x.map(f64::round_ties_even)
+    }
+    #[inline(always)]
     fn lt4(self, a: [f64; 4], b: [f64; 4]) -> u32 {
         (0..4).fold(0, |m, k| m | (u32::from(a[k] < b[k]) << k))
     }

@@ -118,6 +118,7 @@ impl Task for RoundOfDoubles {
             k.min4(a, b),
             k.max4(a, b),
             k.floor4(a),
+            k.round4(a),
             k.abs4(a),
         ];
         let canonical = |x: f64| if x.is_nan() { f64::NAN.to_bits() } else { x.to_bits() };
