@@ -186,7 +186,22 @@ impl Task for Positions<'_> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) {
-        let Self { control, u, v, out, first: [i0, j0] } = self;
+        // Rows of up to 12 points have their loops written out.
+        let bases = self.u.basis.as_slice();
+        if let Some(three) = bases.as_array::<3>() {
+            self.fill_rows(k, three);
+        } else if let Some(two) = bases.as_array::<2>() {
+            self.fill_rows(k, two);
+        } else {
+            self.fill_rows(k, bases);
+        }
+    }
+}
+
+impl Positions<'_> {
+    #[inline(always)]
+    fn fill_rows<K: Kernel, B: AsRef<[Basis]> + ?Sized>(self, k: K, bases: &B) {
+        let Self { control, v, out, first: [i0, j0], .. } = self;
         let control = by_axis(k, control);
         for j in 0..v.parameters.len() {
             let four = &v.basis[j / LANES];
@@ -195,8 +210,9 @@ impl Task for Positions<'_> {
             for (axis, rows) in control.iter().enumerate() {
                 let curve = k.store4(combine_lanes(k, &v, *rows));
                 let curve = [k.splat4(curve[0]), k.splat4(curve[1]), k.splat4(curve[2]), k.splat4(curve[3])];
-                let row = out.run_mut(axis, [i0, j0 + j], LANES * u.basis.len());
-                for (out, u) in row.as_chunks_mut::<LANES>().0.iter_mut().zip(&u.basis) {
+                let bases = bases.as_ref();
+                let row = out.run_mut(axis, [i0, j0 + j], LANES * bases.len());
+                for (out, u) in row.as_chunks_mut::<LANES>().0.iter_mut().zip(bases) {
                     *out = k.store4(combine_curve(k, u, curve));
                 }
             }
