@@ -1,17 +1,18 @@
 //! A thread's own memory, for blocks that find no place in the cache. They last at least as long as the visit that
-//! built them, and are **remembered** by the key of their slot until the memory is full: the next ray often needs the
-//! same.
+//! built them, and are **remembered** by the key of their slot as long as there is room: the next ray often needs the
+//! same. Where there is no more, the oldest chunk of them is forgotten.
 #![allow(unsafe_code)]
 
 use super::memory::{LINE, Memory};
 use rustc_hash::FxHashMap;
 use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
 use std::ptr::NonNull;
 
 /// Lines of an ordinary chunk: 64 KiB.
 const CHUNK_LINES: usize = 1024;
-/// Chunks kept from one visit to the next.
-const CHUNKS_KEPT: usize = 4;
+/// Chunks kept from one visit to the next: four that are full or being filled, and one to go on with.
+const CHUNKS_KEPT: usize = 5;
 /// Bytes that a pin keeps between visits, at most.
 pub(super) const BYTES_KEPT: usize = CHUNKS_KEPT * CHUNK_LINES * LINE;
 
@@ -20,10 +21,17 @@ struct Chunk {
     lines: usize,
 }
 
-/// Chunks that are filled one after the other and emptied together.
+impl Chunk {
+    fn holds(&self, address: usize) -> bool {
+        self.memory.holds(address)
+    }
+}
+
+/// Chunks that are filled one after the other.
 #[derive(Default)]
 pub(super) struct Scratch {
-    chunks: RefCell<Vec<Chunk>>,
+    /// In the order in which they were filled, then those without blocks.
+    chunks: RefCell<VecDeque<Chunk>>,
     current: Cell<usize>,
     /// Lines used of the current chunk. Zero if and only if the whole scratch is empty.
     used: Cell<usize>,
@@ -51,11 +59,12 @@ impl Scratch {
             self.used.set(0);
         }
         if self.current.get() == chunks.len() {
-            chunks.push(Chunk::of(lines.max(CHUNK_LINES)));
+            chunks.push_back(Chunk::of(lines.max(CHUNK_LINES)));
         }
         let first = self.used.replace(self.used.get() + lines);
-        // SAFETY: these lines lie inside the chunk and were not given out since `clear`, which needs `&mut self`, so
-        // that no slice given out before is alive. Chunks own their lines by raw pointer and may move in the vector.
+        // SAFETY: these lines lie inside the chunk and were not given out since `clear` or `forget_oldest` emptied it,
+        // which need `&mut self`, so that no slice given out before is alive. Chunks own their lines by raw pointer and
+        // may move in the queue.
         unsafe { std::slice::from_raw_parts_mut(chunks[self.current.get()].memory.line(first), lines * LINE) }
     }
 
@@ -67,14 +76,25 @@ impl Scratch {
     /// The block noted for a key since the scratch was last empty, and its lines of child words.
     pub(super) fn recall(&self, key: usize) -> Option<(&[u8], usize)> {
         let Remembered { bytes, word_lines } = *self.remembered.borrow().get(&key)?;
-        // SAFETY: the bytes lie in a chunk, were complete when they were noted, and nobody has them to write; `clear`,
-        // which alone gives the lines out anew, forgets them and needs `&mut self`.
+        // SAFETY: the bytes lie in a chunk, were complete when they were noted, and nobody has them to write; `clear` and
+        // `forget_oldest`, after which alone the lines are given out anew, forget them and need `&mut self`.
         Some((unsafe { bytes.as_ref() }, word_lines))
     }
 
-    /// Whether there is as much as may be kept from visit to visit.
-    pub(super) fn is_full(&self) -> bool {
-        self.current.get() >= CHUNKS_KEPT
+    /// Makes room, if there is more than may be kept from visit to visit: forgets the oldest blocks, and those whose
+    /// slots are in them.
+    pub(super) fn forget_oldest(&mut self) {
+        while self.current.get() + 1 >= CHUNKS_KEPT {
+            let chunks = self.chunks.get_mut();
+            let oldest = chunks.pop_front().expect("the current chunk and those before");
+            // A key below a block is an address in it.
+            let is_left = |key: usize, bytes: NonNull<[u8]>| !oldest.holds(key) && !oldest.holds(bytes.addr().get());
+            self.remembered.get_mut().retain(|&key, block| is_left(key, block.bytes));
+            self.current.set(self.current.get() - 1);
+            if oldest.lines == CHUNK_LINES && chunks.len() + 1 < CHUNKS_KEPT {
+                chunks.push_back(oldest);
+            }
+        }
     }
 
     /// Whether there are blocks.
@@ -135,9 +155,34 @@ mod tests {
         for key in 0..100 {
             assert_eq!(scratch.recall(key), Some((&[key as u8; 64][..], key % 3)));
         }
-        assert!(!scratch.is_full() && scratch.recall(100).is_none());
+        assert!(scratch.recall(100).is_none());
         scratch.clear();
         assert!(scratch.recall(7).is_none());
+    }
+
+    #[test]
+    fn the_oldest_blocks_are_forgotten_with_those_below_them() {
+        let mut scratch = Scratch::default();
+        let parent = {
+            let bytes = scratch.bytes(64);
+            scratch.remember(0, bytes, 1);
+            bytes.as_ptr().addr()
+        };
+        for key in 1..2000 {
+            let bytes = scratch.bytes(640);
+            bytes.fill(key as u8);
+            scratch.remember(key, bytes, 0);
+            if key == 150 {
+                scratch.remember(parent + 3, bytes, 0);
+            }
+            scratch.forget_oldest();
+            let is_known = |key: usize| scratch.recall(key).is_some();
+            let oldest = (1..=key).find(|&key| is_known(key)).expect("the last one");
+            assert!((oldest..=key).all(|key| scratch.recall(key).is_some_and(|(bytes, _)| bytes == [key as u8; 640])));
+            // A chunk holds 102 of them; the parent is in the first one, its child in the second.
+            assert!(oldest == 1 || (3 * 102..=4 * 102).contains(&(key - oldest)), "{oldest} to {key}");
+            assert_eq!(is_known(parent + 3), key >= 150 && is_known(0));
+        }
     }
 
     #[test]
