@@ -80,6 +80,13 @@ impl PackedFrame {
         let [[.., parts_u], [.., parts_v]] = self.axes;
         [part(i, parts_u & !IS_TURNED), part(j, parts_v)]
     }
+
+    /// As [`part`](Self::part), its half along u and along v: 0 to 7 each.
+    #[inline(always)]
+    pub fn half_part(self, [i, j]: [u32; 2]) -> [u32; 2] {
+        let [[.., parts_u], [.., parts_v]] = self.axes;
+        [half_part(i, parts_u & !IS_TURNED), half_part(j, parts_v)]
+    }
 }
 
 /// In each half, the sum of lanes 0 to 2, in lane 0.
@@ -97,6 +104,12 @@ pub(super) fn parts_per_cell(n: usize) -> u8 {
 #[inline(always)]
 pub(super) fn part(cell: u32, parts_per_cell: u8) -> u32 {
     cell * u32::from(parts_per_cell) / 64 % PARTS as u32
+}
+
+/// The half of a part in which a cell is, of all of the patch's: 2 `part` or one more.
+#[inline(always)]
+pub(super) fn half_part(cell: u32, parts_per_cell: u8) -> u32 {
+    cell * u32::from(parts_per_cell) / 32 % (2 * PARTS as u32)
 }
 
 /// m_u and m_v for a patch that leads along `of_u` and `of_v` on the whole, each at a right angle to the other's edges;

@@ -50,7 +50,7 @@ pub use node::{NODE_BYTES, NodeView, encode_node, is_node};
 use piece::leaves_below;
 pub use piece::{MAX_CELLS, MOST_PIECE_BYTES, PieceLayout, PieceView, VertexFormat};
 pub use ray::{LATTICE_LIMIT, LatticeRay, Plane};
-pub use skyline::{Skyline, SkylineSheet, SkylineView};
+pub use skyline::{PartSkyline, SeenFrom, Skyline, SkylineSheet, SkylineView};
 
 #[cfg(test)]
 mod tests;

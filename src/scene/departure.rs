@@ -13,7 +13,7 @@ use super::pieces::{n_pieces, with_pieces};
 use super::skyline;
 use super::world::{GridCache, WorldMesh};
 use crate::cache::{MemoTable, Pin, Slot, Visit};
-use crate::grid::{CellRect, Horizon, LatticeRay, NodeView, Skyline};
+use crate::grid::{CellRect, Horizon, LatticeRay, NodeView, PartSkyline, SeenFrom, Skyline};
 use crate::ids::{MeshId, PatchId};
 use crate::math::simd::{self, Kernel};
 use crate::math::{PrimitiveRef, Ray};
@@ -28,6 +28,12 @@ const MOST_HORIZONS: usize = 1 << 16;
 /// Patches whose skylines are remembered at most: 2.5 MiB. Four times as many gain nothing more there.
 const MOST_SKYLINES: usize = 1 << 14;
 
+/// Parts of patches whose own skylines are remembered at most: 2 MiB.
+const MOST_PART_SKYLINES: usize = 1 << 15;
+
+/// Parts of a patch.
+const PARTS: u32 = 16;
+
 /// Pieces of a patch whose horizon is found at most. With 64 instead, ambient occlusion of bigguy and monsterfrog at
 /// 1920x1080 and one cell a pixel took 1.14 and 1.09 times as long.
 const MOST_PIECES: usize = 256;
@@ -36,16 +42,27 @@ const MOST_PIECES: usize = 256;
 /// at 960x540 took 0.2 % more instructions with 16 than with 8, and as many at 1920x1080 with 4 as with 8.
 const RAYS_PER_PIECE: u32 = 8;
 
-/// Rays that clear the horizon of a patch before its skyline is found, and for each of its pieces so many more. To find
+/// Rays that leave a patch whose horizon is known before its skyline is found, and for each of its pieces so many more. To find
 /// it takes some 80 µs for patches of one piece, 135 for four and 310 for sixteen, and spares a ray 30 to 50 ns on
 /// average: about as many rays win that back.
 const RAYS_BEFORE_SKYLINE: [u32; 2] = [1664, 160];
+
+/// Rays that start in a part of a patch and do not clear the patch's skyline before the part's own is found, and so many
+/// more for each of the patch's pieces.
+const RAYS_BEFORE_PART: [u32; 2] = [1216, 96];
 
 /// One of so many of them is counted: who counts writes what all threads read.
 const RAYS_PER_COUNT: u32 = 32;
 
 /// Pieces of a patch whose skyline is found at most: those of all its neighbours are looked at as well.
 const MOST_PIECES_OF_SKYLINE: usize = 16;
+
+/// If parts see so little more than their patches by their own skylines, on the mean of a mesh so far and in percent of
+/// rays, few more are sought.
+const LEAST_GAIN: u32 = 10;
+
+/// Rays may start so many times as high as the one for which a part's skyline is found, and as many lattice steps more.
+const LIFT_OF_PART: [f32; 2] = [4.0, 64.0];
 
 /// If the mean openness of a mesh's skylines so far, in percent, is less, few more are sought: where few rays clear
 /// them they do not win back what they take.
@@ -57,26 +74,27 @@ const FIRST_SKYLINES: u64 = 32;
 /// One of so many of a mesh's patches is looked at even so: those before may have been in a corner.
 const PATCHES_PER_TRY: u32 = 16;
 
-/// How open a mesh's skylines are that were found.
+/// What a mesh's skylines that were found are worth.
 #[derive(Default)]
-struct Openness {
+struct Worth {
     n: AtomicU64,
-    /// Of percents.
+    /// Of percents of rays.
     sum: AtomicU64,
     /// Patches that were passed over.
     n_passed_over: AtomicU32,
 }
 
-impl Openness {
-    fn note(&self, openness: u32) {
+impl Worth {
+    fn note(&self, percent: u32) {
         self.n.fetch_add(1, Ordering::Relaxed);
-        self.sum.fetch_add(u64::from(openness), Ordering::Relaxed);
+        self.sum.fetch_add(u64::from(percent), Ordering::Relaxed);
     }
 
-    fn is_worth_while(&self) -> bool {
+    /// Whether another one is worth while, which takes so many percent.
+    fn is_enough(&self, least: u32) -> bool {
         let n = self.n.load(Ordering::Relaxed);
         n < FIRST_SKYLINES
-            || self.sum.load(Ordering::Relaxed) >= n * u64::from(LEAST_OPENNESS)
+            || self.sum.load(Ordering::Relaxed) >= n * u64::from(least)
             || self.n_passed_over.fetch_add(1, Ordering::Relaxed) % PATCHES_PER_TRY == PATCHES_PER_TRY - 1
     }
 }
@@ -88,6 +106,8 @@ pub struct DepartureCounts {
     pub horizons: u64,
     /// Skylines found, likewise.
     pub skylines: u64,
+    /// Skylines of parts of patches found, likewise.
+    pub part_skylines: u64,
     /// Rays that left above a skyline, and were not walked at all. (Those that pass their own patch by alone are too
     /// many to be counted: primary rays ran at 0.99 of the speed.)
     pub rays_past_all: u64,
@@ -97,6 +117,7 @@ impl AddAssign for DepartureCounts {
     fn add_assign(&mut self, other: Self) {
         self.horizons += other.horizons;
         self.skylines += other.skylines;
+        self.part_skylines += other.part_skylines;
         self.rays_past_all += other.rays_past_all;
     }
 }
@@ -107,8 +128,11 @@ pub(super) struct Departures {
     horizons: MemoTable<3>,
     /// Likewise, of those that many rays have left.
     skylines: MemoTable<{ Skyline::WORDS }>,
-    /// Of each mesh.
-    openness: Box<[Openness]>,
+    /// By 16 times the patch's number and the part, of those that many rays have left which did not clear the patch's
+    /// skyline.
+    part_skylines: MemoTable<{ PartSkyline::WORDS }>,
+    /// Of each mesh: how open skylines are, and by how much more those of parts.
+    worth: Box<[[Worth; 2]]>,
     /// How many patches there are before those of each mesh.
     first: Box<[u32]>,
 }
@@ -148,17 +172,16 @@ impl<'c> Leaving<'c> {
         (builder, pin): (&mut Builder<'_>, &mut Pin<'_>),
     ) -> Self {
         let departures = cache.departures();
-        let Some(Start { number, patch, .. }) = start else { return Self::NOTHING };
+        let Some(at @ Start { number, patch, .. }) = start else { return Self::NOTHING };
         let Some(words) = departures.horizons.get(number) else {
             return Self { patch, unknown: Some(departures) };
         };
-        if !Horizon::from_words(words).is_cleared_by(k, in_lattice) {
-            return Self::NOTHING;
+        let horizon = Horizon::from_words(words);
+        if in_lattice.is_one_in(RAYS_PER_COUNT) {
+            let of = PatchContext { id, mesh, patch };
+            departures.ask_for_skyline(in_lattice, horizon, at, of, cache, builder, pin);
         }
-        if in_lattice.is_one_in(RAYS_PER_COUNT) && departures.skylines.known(number).is_none() {
-            departures.ask_for_skyline(in_lattice, PatchContext { id, mesh, patch }, cache, builder, pin);
-        }
-        Self { patch, unknown: None }
+        if horizon.is_cleared_by(k, in_lattice) { Self { patch, unknown: None } } else { Self::NOTHING }
     }
 
     /// Whether the ray need not be tested against this patch. `root` is the slot of its first block.
@@ -180,27 +203,36 @@ impl Departures {
     /// For meshes with so many patches each.
     pub fn new(n_patches: impl Iterator<Item = usize> + Clone) -> Self {
         let first = n_patches.clone().scan(0u32, |next, n| Some(std::mem::replace(next, next.wrapping_add(n as u32))));
-        let [n_horizons, n_skylines] = entries_for(n_patches.sum());
+        let [n_horizons, n_skylines, n_parts] = entries_for(n_patches.sum());
         let (horizons, skylines) = (MemoTable::new(n_horizons), MemoTable::new(n_skylines));
         let first: Box<[u32]> = first.collect();
-        let openness = first.iter().map(|_| Openness::default()).collect();
-        Self { first, horizons, skylines, openness }
+        let worth = first.iter().map(|_| Default::default()).collect();
+        Self { first, horizons, skylines, part_skylines: MemoTable::new(n_parts), worth }
     }
 
-    /// Bytes of the tables for meshes with so many patches in all: some 4.5 MiB at most.
+    /// Bytes of the tables for meshes with so many patches in all: some 6.5 MiB at most.
     pub fn bytes_for(n_patches: usize) -> usize {
-        let [n_horizons, n_skylines] = entries_for(n_patches);
-        MemoTable::<3>::bytes_for(n_horizons) + MemoTable::<{ Skyline::WORDS }>::bytes_for(n_skylines)
+        let [n_horizons, n_skylines, n_parts] = entries_for(n_patches);
+        MemoTable::<3>::bytes_for(n_horizons)
+            + MemoTable::<{ Skyline::WORDS }>::bytes_for(n_skylines)
+            + MemoTable::<{ PartSkyline::WORDS }>::bytes_for(n_parts)
     }
 
-    /// Whether a ray that starts there is known to meet nothing of the mesh, by the skyline of its patch. `direction`
-    /// is its direction in the lattice.
+    /// Whether a ray that starts there is known to meet nothing of the mesh, by the skyline of its patch or of the part.
+    /// `direction` is its direction in the lattice.
     #[inline(always)]
     pub fn meets_nothing<K: Kernel>(&self, k: K, start: Option<Start>, direction: K::D, mesh: &WorldMesh) -> bool {
         let Some(Start { number, cell, above, .. }) = start else { return false };
         let Some(skyline) = self.skylines.known(number) else { return false };
         let lift = above * mesh.lattice_per_world();
-        Skyline::is_cleared_by(k, direction, cell, lift, |word| skyline.word(word)) && skyline.was_there()
+        if Skyline::is_cleared_by(k, direction, cell, lift, |word| skyline.word(word)) {
+            return skyline.was_there();
+        }
+        let number = number_of_part(number, Skyline::part_of(skyline.word(0), cell));
+        let Some(of_part) = self.part_skylines.known(number) else { return false };
+        PartSkyline::is_cleared_by(k, direction, cell, lift, |word| of_part.word(word))
+            && of_part.was_there()
+            && skyline.was_there()
     }
 
     /// Where the ray leaves the mesh, if it does and that is known.
@@ -234,47 +266,110 @@ impl Departures {
         horizon.is_cleared_by(simd::Portable, ray)
     }
 
-    /// Finds the skyline of a patch once enough rays have cleared its horizon.
+    /// Finds the skyline of a patch once enough rays have left it to the side of its horizon, and of one of its parts once
+    /// enough more have not cleared that.
     #[cold]
     #[inline(never)]
+    #[allow(clippy::too_many_arguments)]
     fn ask_for_skyline(
         &self,
         ray: &LatticeRay,
+        horizon: Horizon,
+        start: Start,
         of: PatchContext<'_>,
         cache: &GridCache,
         builder: &mut Builder<'_>,
         pin: &mut Pin<'_>,
     ) {
-        let (number, openness) = (self.number(of.id, of.patch), &self.openness[of.id.idx()]);
-        let [rays, more] = RAYS_BEFORE_SKYLINE;
-        // Where there are more patches than entries, none would keep its own if it were easily taken over.
-        let may_replace = ray.is_one_in(32 * RAYS_PER_COUNT);
-        if !self
-            .skylines
-            .is_due(number, may_replace, || (rays + more * n_pieces(builder.cells_of(of)) as u32) / RAYS_PER_COUNT)
-        {
+        if !horizon.is_on_side_of(ray) {
             return;
         }
-        let is_found = n_pieces(builder.cells_of(of)) <= MOST_PIECES_OF_SKYLINE
-            && !of.mesh.surface().edited().has_holes()
-            && openness.is_worth_while();
-        if !is_found {
+        if let Some(words) = self.skylines.get(start.number) {
+            return self.ask_for_part(ray, start, Skyline::from_words(words), of, cache, builder, pin);
+        }
+        let number = start.number;
+        if !self.skylines.is_due(number, may_replace(ray), || rays_counted(RAYS_BEFORE_SKYLINE, of, builder)) {
+            return;
+        }
+        let [worth, _] = &self.worth[of.id.idx()];
+        if !may_have_skyline(of, builder) || !worth.is_enough(LEAST_OPENNESS) {
             return self.skylines.put_off(number);
         }
-        let skyline = skyline::of_patch(of, ray, cache, builder, &pin.visit());
-        openness.note(skyline.openness());
         builder.departures.skylines += 1;
-        match skyline {
-            Skyline::NONE => self.skylines.put_off(number),
-            skyline => self.skylines.put(number, skyline.to_words()),
+        match skyline::view_from(of, SeenFrom::Patch, ray, cache, builder, &pin.visit()) {
+            Some(view) => {
+                let skyline = view.skyline();
+                worth.note(skyline.openness());
+                self.skylines.put(number, skyline.to_words());
+            }
+            None => {
+                worth.note(0);
+                self.skylines.put_off(number);
+            }
+        }
+    }
+
+    /// As [`ask_for_skyline`](Self::ask_for_skyline) for the part where the ray starts.
+    #[allow(clippy::too_many_arguments)]
+    fn ask_for_part(
+        &self,
+        ray: &LatticeRay,
+        Start { number, cell, above, .. }: Start,
+        of_patch: Skyline,
+        of: PatchContext<'_>,
+        cache: &GridCache,
+        builder: &mut Builder<'_>,
+        pin: &mut Pin<'_>,
+    ) {
+        let part = of_patch.part(cell);
+        let number = number_of_part(number, part);
+        if !self.part_skylines.is_due(number, may_replace(ray), || rays_counted(RAYS_BEFORE_PART, of, builder)) {
+            return;
+        }
+        let [_, worth] = &self.worth[of.id.idx()];
+        if !may_have_skyline(of, builder) || !worth.is_enough(LEAST_GAIN) {
+            return self.part_skylines.put_off(number);
+        }
+        builder.departures.part_skylines += 1;
+        let [times, more] = LIFT_OF_PART;
+        let seen_from =
+            SeenFrom::Part { number: part as usize, lift: times * above * of.mesh.lattice_per_world() + more };
+        let view = skyline::view_from(of, seen_from, ray, cache, builder, &pin.visit());
+        let skyline = view.map(|view| view.part_skyline());
+        let gain = skyline.map_or(0, |of_part| of_part.openness().saturating_sub(of_patch.openness_of_part(part)));
+        worth.note(gain);
+        match skyline.filter(|_| gain > 0) {
+            Some(skyline) => self.part_skylines.put(number, skyline.to_words()),
+            None => self.part_skylines.put_off(number),
         }
     }
 }
 
-/// Entries for horizons and for skylines.
-fn entries_for(n_patches: usize) -> [usize; 2] {
-    let n_numbered = if n_patches < u32::MAX as usize - 1 { n_patches } else { 0 };
-    [MOST_HORIZONS, MOST_SKYLINES].map(|most| n_numbered.min(most))
+/// A part's number among those of all patches; where they are too many to be numbered, there are no entries either.
+#[inline(always)]
+fn number_of_part(patch: u32, part: u32) -> u32 {
+    patch.wrapping_mul(PARTS).wrapping_add(part)
+}
+
+/// Where there are more patches than entries, none would keep its own if it were easily taken over.
+fn may_replace(ray: &LatticeRay) -> bool {
+    ray.is_one_in(32 * RAYS_PER_COUNT)
+}
+
+/// Of the rays that go before a skyline, how many are counted.
+fn rays_counted([rays, more]: [u32; 2], of: PatchContext<'_>, builder: &mut Builder<'_>) -> u32 {
+    (rays + more * n_pieces(builder.cells_of(of)) as u32) / RAYS_PER_COUNT
+}
+
+fn may_have_skyline(of: PatchContext<'_>, builder: &mut Builder<'_>) -> bool {
+    n_pieces(builder.cells_of(of)) <= MOST_PIECES_OF_SKYLINE && !of.mesh.surface().edited().has_holes()
+}
+
+/// Entries for horizons, for skylines and for those of parts.
+fn entries_for(n_patches: usize) -> [usize; 3] {
+    let (n_numbered, n_parts) = (u32::MAX as usize - 1, PARTS as usize * n_patches);
+    [(n_patches, MOST_HORIZONS), (n_patches, MOST_SKYLINES), (n_parts, MOST_PART_SKYLINES)]
+        .map(|(n, most)| if n < n_numbered { n.min(most) } else { 0 })
 }
 
 /// The patch that is left.
@@ -322,13 +417,13 @@ mod tests {
 
     #[test]
     fn skylines_that_are_seldom_cleared_are_seldom_sought() {
-        let openness = Openness::default();
-        (1..FIRST_SKYLINES).for_each(|_| openness.note(LEAST_OPENNESS - 10));
-        assert!(openness.is_worth_while(), "too few to tell");
-        openness.note(LEAST_OPENNESS - 10);
-        let tries = (0..10 * PATCHES_PER_TRY).filter(|_| openness.is_worth_while()).count();
+        let worth = Worth::default();
+        (1..FIRST_SKYLINES).for_each(|_| worth.note(LEAST_OPENNESS - 10));
+        assert!(worth.is_enough(LEAST_OPENNESS), "too few to tell");
+        worth.note(LEAST_OPENNESS - 10);
+        let tries = (0..10 * PATCHES_PER_TRY).filter(|_| worth.is_enough(LEAST_OPENNESS)).count();
         assert_eq!(tries, 10, "one of sixteen is tried");
-        (0..FIRST_SKYLINES).for_each(|_| openness.note(LEAST_OPENNESS + 10));
-        assert!(openness.is_worth_while(), "others found at the same time may be better");
+        (0..FIRST_SKYLINES).for_each(|_| worth.note(LEAST_OPENNESS + 10));
+        assert!(worth.is_enough(LEAST_OPENNESS), "others found at the same time may be better");
     }
 }

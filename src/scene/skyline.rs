@@ -6,7 +6,7 @@ use super::builder::{Builder, PatchContext};
 use super::pieces::{n_pieces, with_pieces};
 use super::world::GridCache;
 use crate::cache::{SlotId, Visit};
-use crate::grid::{LatticeRay, Skyline, SkylineSheet, SkylineView};
+use crate::grid::{LatticeRay, SeenFrom, SkylineSheet, SkylineView};
 use crate::math::Bounds;
 
 /// Patches near one whose pieces are looked at for its skyline, at most.
@@ -27,20 +27,22 @@ const LEAST_GAIN: f32 = 16.0;
 /// Boxes that are opened, at most.
 const MOST_OPENED: usize = 1024;
 
-/// The skyline of a patch on the side to which the ray leaves it.
-pub(super) fn of_patch(
+/// What is seen from a patch, on the side to which the ray leaves it, or from one of its parts; `None` if there is no
+/// such side.
+pub(super) fn view_from(
     of: PatchContext<'_>,
+    seen_from: SeenFrom,
     ray: &LatticeRay,
     cache: &GridCache,
     builder: &mut Builder<'_>,
     visit: &Visit<'_>,
-) -> Skyline {
+) -> Option<SkylineView> {
     let mut bounds = Bounds::EMPTY;
     let sheet = with_pieces(of, None, visit, builder, |pieces| {
         pieces.iter().for_each(|piece| bounds = bounds.union(piece.bounds()));
-        SkylineSheet::new(pieces, ray)
+        SkylineSheet::new(pieces, ray, seen_from)
     });
-    let Some(mut sheet) = sheet else { return Skyline::NONE };
+    let mut sheet = sheet?;
     let table = cache.table(of.id);
     let mut near = leaves_near(of, bounds);
     near.retain(|leaf| {
@@ -51,13 +53,11 @@ pub(super) fn of_patch(
         let block = visit.peek(visit.root(table, SlotId(leaf.slot)));
         with_pieces(of, block, visit, builder, |pieces| sheet.add(pieces))
     });
-    match sheet.view() {
-        Some(mut view) => {
-            look_around(of, &near, &mut view);
-            view.skyline()
-        }
-        None => Skyline::NONE,
+    let mut view = sheet.view();
+    if !view.is_shut() {
+        look_around(of, &near, &mut view);
     }
+    Some(view)
 }
 
 /// Leaves of other patches near the one within these bounds.
@@ -98,7 +98,7 @@ mod tests {
     use super::super::world::{World, WorldMesh};
     use super::*;
     use crate::cache::CacheConfig;
-    use crate::grid::TriangleId;
+    use crate::grid::{PartSkyline, SeenFrom, Skyline, TriangleId};
     use crate::ids::{MeshId, PatchId, VertexId};
     use crate::math::simd::{Kernel, Portable, Task, run};
     use crate::math::{Intersect, PrimitiveRef, Ray};
@@ -126,30 +126,37 @@ mod tests {
         }
     }
 
-    /// Whether the skyline says that a ray meets nothing.
+    /// Whether the skyline of the patch, or of the part, says that a ray meets nothing.
     #[derive(Clone, Copy)]
     struct Cleared {
-        skyline: [u64; Skyline::WORDS],
+        patch: [u64; Skyline::WORDS],
+        part: Option<[u64; PartSkyline::WORDS]>,
         direction: DVec3,
         cell: [u16; 2],
         lift: f32,
     }
 
     impl Task for Cleared {
-        type Output = bool;
+        type Output = [bool; 2];
 
         #[inline(always)]
-        fn run<K: Kernel>(self, k: K) -> bool {
-            let DVec3 { x, y, z } = self.direction;
-            Skyline::is_cleared_by(k, k.load4(&[x, y, z, 0.0]), self.cell, self.lift, |word| self.skyline[word])
+        fn run<K: Kernel>(self, k: K) -> [bool; 2] {
+            let Self { patch, part, direction: DVec3 { x, y, z }, cell, lift } = self;
+            let direction = k.load4(&[x, y, z, 0.0]);
+            let by_part = match part {
+                Some(part) => PartSkyline::is_cleared_by(k, direction, cell, lift, |word| part[word]),
+                None => false,
+            };
+            [Skyline::is_cleared_by(k, direction, cell, lift, |word| patch[word]), by_part]
         }
     }
 
-    /// What was tried: rays, those that were cleared, and those that met nothing.
+    /// What was tried: rays, those that were cleared by the skyline of the patch and by that of the part, and those that
+    /// met nothing.
     #[derive(Default, Debug)]
     struct Tally {
         n: usize,
-        cleared: usize,
+        cleared: [usize; 2],
         open: usize,
     }
 
@@ -175,6 +182,7 @@ mod tests {
                 triangles(&rates).map(|t| t.map(|v| IVec3::from_array(grid.vertices[v]).as_dvec3())).collect();
             for side in [1.0, -1.0] {
                 let mut found = None;
+                let mut of_parts: [Option<PartSkyline>; 16] = [None; 16];
                 for _ in 0..150 {
                     let k = random.below(all.len());
                     let [a, b, c] = all[k];
@@ -187,34 +195,50 @@ mod tests {
                     let half = (k % 2) as u32;
                     let direction = random.in_cube() + random.below(3) as f64 * normal;
                     let direction = direction * direction.dot(normal).signum();
-                    let skyline = *found.get_or_insert_with(|| {
+                    let view = |seen_from| {
                         let id = TriangleId::new(patch, i as u32, j as u32, half);
                         let ray = LatticeRay::new(a, direction, f32::INFINITY, id);
                         let (mut builder, mut pin) = (Builder::default(), cache.segments().pin());
-                        of_patch(of, &ray, &cache, &mut builder, &pin.visit())
-                    });
+                        view_from(of, seen_from, &ray, &cache, &mut builder, &pin.visit())
+                    };
                     // From what a renderer's rays start above to the most that is allowed for.
                     let lift = 2f64.powf(-8.0 + 27.0 * random.unit());
+                    let skyline = *found
+                        .get_or_insert_with(|| view(SeenFrom::Patch).map_or(Skyline::NONE, |view| view.skyline()));
+                    let cell = [i as u16, j as u16];
+                    let number = skyline.part(cell) as usize;
+                    let of_part = of_parts[number].or_else(|| {
+                        let seen_from = SeenFrom::Part { number, lift: 4.0 * lift as f32 };
+                        view(seen_from).map(|view| view.part_skyline())
+                    });
+                    of_parts[number] = of_part;
                     let (u, v) = (random.unit(), random.unit());
                     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
                     // Off the edges: above the surface, not where it is not known what is above.
                     let (u, v) = (0.01 + 0.97 * u, 0.01 + 0.97 * v);
                     let origin = a + u * (b - a) + v * (c - a) + lift * normal;
-                    let cell = [i as u16, j as u16];
-                    let ask = Cleared { skyline: skyline.to_words(), direction, cell, lift: 1.001 * lift as f32 };
+                    let (words, part) = (skyline.to_words(), of_part.map(PartSkyline::to_words));
+                    let ask = Cleared { patch: words, part, direction, cell, lift: 1.001 * lift as f32 };
                     let lattice_from_world = mesh.lattice_from_world().inverse();
                     let from = PrimitiveRef { mesh: MeshId(0), patch, cell, half: half as u8 };
                     let ray = Ray::new(
                         lattice_from_world.transform_point3(origin),
                         lattice_from_world.transform_vector3(direction),
                     );
-                    let is_cleared = run(ask);
-                    assert_eq!(ask.run(Portable), is_cleared, "kernels agree");
-                    assert!(!run(Cleared { lift: f32::INFINITY, ..ask }), "no lift is allowed for as large");
+                    let are_cleared = run(ask);
+                    assert_eq!(ask.run(Portable), are_cleared, "kernels agree");
+                    assert_eq!(
+                        run(Cleared { lift: f32::INFINITY, ..ask }),
+                        [false; 2],
+                        "no lift is allowed for as large"
+                    );
                     let hit = Intersector::new(&world, &cache).closest(&Ray { from: Some(from), ..ray });
-                    assert!(!is_cleared || hit.is_none(), "{name}, {rate:?}, {patch}, {cell:?}: {ray:?} meets {hit:?}");
+                    assert!(
+                        are_cleared == [false; 2] || hit.is_none(),
+                        "{name}, {rate:?}, {patch}, {cell:?}, {are_cleared:?}: {ray:?} meets {hit:?}"
+                    );
                     tally.n += 1;
-                    tally.cleared += usize::from(is_cleared);
+                    (0..2).for_each(|by| tally.cleared[by] += usize::from(are_cleared[by]));
                     tally.open += usize::from(hit.is_none());
                 }
             }
@@ -249,6 +273,6 @@ mod tests {
         for seed in 0..60 {
             leave("random", random_mesh(seed), DicingRate::Fixed(1 + seed as u32 % 12), &mut random, &mut tally);
         }
-        assert!(tally.cleared > tally.open / 15, "{tally:?}");
+        assert!(tally.cleared[0] > tally.open / 15 && tally.cleared[1] > tally.open / 4, "{tally:?}");
     }
 }

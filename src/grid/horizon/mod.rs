@@ -50,7 +50,7 @@ pub use borders::Borders;
 
 use super::frame::{self, Course, MARGIN_IN_HEIGHT, PACKED, PARTS, PackedFrame, part, parts_per_cell};
 use super::{LatticeRay, PieceView, VertexFormat, leaves_below};
-use crate::math::simd::{self, Kernel, Task};
+use crate::math::simd::{self, Kernel, Portable, Task};
 use bytemuck::{Pod, Zeroable};
 use edges::{Measure, Steepest};
 use glam::{IVec3, Vec3};
@@ -125,6 +125,14 @@ impl Horizon {
         rise_u.max(rise_v) < NEVER
             && !self.is_ravine(u, v)
             && height > f32::from(rise_u) * ways[0] + f32::from(rise_v) * ways[1] + MARGIN_IN_HEIGHT
+    }
+
+    /// Whether the ray leaves to the side on which this is the horizon, roughly.
+    pub fn is_on_side_of(self, ray: &LatticeRay) -> bool {
+        let direction = ray.direction().as_vec3();
+        let [x, y, z] = direction.to_array();
+        let Course { height, .. } = self.frame.course(Portable, [x, y, z, 0.0, x, y, z, 0.0]);
+        height > 0.0
     }
 
     /// Whether nobody leaves from part (u, v).

@@ -2,12 +2,13 @@
 
 use super::octants::{Extent, NOTHING, steepest};
 use super::sheet::Frame;
-use crate::grid::frame::{PARTS, part, parts_per_cell};
+use crate::grid::frame::{half_part, part, parts_per_cell};
 use crate::grid::vertex_row::VertexRow;
 use crate::grid::{PieceView, VertexFormat};
 use crate::math::Bounds;
 use crate::math::simd::{Kernel, Task};
 use glam::{IVec3, Vec3};
+use std::ops::Range;
 
 /// The least cosine of the angles between triangles of the sheet and the patch that is left.
 const LEAST_COSINE: f32 = 0.05;
@@ -28,20 +29,65 @@ pub(super) struct Block {
     pub extent: Extent,
     /// How steep its triangles are at most, octant by octant.
     pub steepness: [f32; 8],
+    /// Whether n sees all of them.
+    pub is_seen: bool,
 }
 
 impl Block {
-    pub const EMPTY: Self = Self { bounds: Bounds::EMPTY, extent: Extent::NONE, steepness: [NOTHING; 8] };
+    pub const EMPTY: Self =
+        Self { bounds: Bounds::EMPTY, extent: Extent::NONE, steepness: [NOTHING; 8], is_seen: true };
+}
+
+/// How the cells of a patch are divided into blocks.
+pub(super) struct Division {
+    /// For each cell along u, and along v, which block it is in.
+    blocks: [Vec<u8>; 2],
+}
+
+impl Division {
+    /// Into the parts of the patch.
+    pub fn in_parts(cells: [usize; 2]) -> Self {
+        let parts_of = |n: usize| (0..n as u32).map(|cell| part(cell, parts_per_cell(n)) as u8).collect();
+        Self { blocks: cells.map(parts_of) }
+    }
+
+    /// Into halves of parts, some of which have no cells.
+    pub fn in_half_parts(cells: [usize; 2]) -> Self {
+        let parts_of = |n: usize| (0..n as u32).map(|cell| half_part(cell, parts_per_cell(n)) as u8).collect();
+        Self { blocks: cells.map(parts_of) }
+    }
+
+    /// Into single cells, or into as few as make so many blocks a side.
+    pub fn fine(cells: [usize; 2], most: usize) -> Self {
+        let block = |cell: usize, n: usize| (cell * most / n.max(most)) as u8;
+        Self { blocks: cells.map(|n| (0..n).map(|cell| block(cell, n)).collect()) }
+    }
+
+    /// Blocks along u and v.
+    pub fn n_blocks(&self) -> [usize; 2] {
+        [0, 1].map(|axis| self.blocks[axis].last().map_or(0, |&last| usize::from(last) + 1))
+    }
+
+    /// The block that a cell is in, along u or v.
+    #[inline(always)]
+    pub fn block_of(&self, axis: usize, cell: usize) -> usize {
+        usize::from(self.blocks[axis][cell])
+    }
+
+    /// The cells of each block along u or v.
+    pub fn ranges(&self, axis: usize) -> Vec<Range<usize>> {
+        let cells = &self.blocks[axis];
+        let first = |block: usize| cells.partition_point(|&of| usize::from(of) < block);
+        (0..self.n_blocks()[axis]).map(|block| first(block)..first(block + 1)).collect()
+    }
 }
 
 /// A patch as n sees it.
 pub(super) struct Blocks {
-    /// By 4 times the part along v and the part along u.
-    pub parts: [Block; PARTS * PARTS],
+    /// Row by row.
+    pub blocks: Vec<Block>,
     /// Around all of them.
     pub whole: Bounds,
-    /// Whether n sees all triangles.
-    pub are_seen: bool,
 }
 
 /// Finds the box around all pieces of a patch; `None` if corners are no exact floats.
@@ -74,11 +120,11 @@ impl Task for MeasureBox<'_> {
     }
 }
 
-/// Measures all pieces of a patch of so many cells; `None` if corners are no exact floats.
+/// Measures all pieces of a patch; `None` if corners are no exact floats.
 pub(super) struct Measure<'a> {
     pub frame: &'a Frame,
     pub pieces: &'a [PieceView<'a>],
-    pub cells: [usize; 2],
+    pub division: &'a Division,
 }
 
 impl Task for Measure<'_> {
@@ -86,18 +132,18 @@ impl Task for Measure<'_> {
 
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) -> Option<Blocks> {
-        let Self { frame, pieces, cells } = self;
+        let Self { frame, pieces, division } = self;
         let axes = Axes::new(k, frame);
-        let parts = cells.map(parts_per_cell);
-        let mut blocks = Blocks { parts: [Block::EMPTY; PARTS * PARTS], whole: Bounds::EMPTY, are_seen: true };
+        let [n_u, n_v] = division.n_blocks();
+        let mut blocks = Blocks { blocks: vec![Block::EMPTY; n_u * n_v], whole: Bounds::EMPTY };
         for piece in pieces {
             if piece.head.format == VertexFormat::Four as u8 {
                 return None;
             }
-            measure_piece(k, &axes, frame, piece, parts, &mut blocks);
+            measure_piece(k, &axes, frame, piece, division, &mut blocks.blocks);
         }
-        let Blocks { parts, whole, .. } = &mut blocks;
-        for block in parts {
+        let Blocks { blocks: all, whole } = &mut blocks;
+        for block in all {
             block.extent = Extent::of(k, &block.bounds);
             *whole = whole.union(block.bounds);
         }
@@ -111,23 +157,24 @@ fn measure_piece<K: Kernel>(
     axes: &Axes<K>,
     frame: &Frame,
     piece: &PieceView<'_>,
-    [parts_u, parts_v]: [u8; 2],
-    blocks: &mut Blocks,
+    division: &Division,
+    blocks: &mut [Block],
 ) {
     let (cells, [n_u, n_v]) = (piece.cells(), piece.cells().size());
+    let [i0, j0] = [cells.i0, cells.j0].map(usize::from);
     let corner = axes.along_of(k, frame, piece);
-    let row_of = |j: usize| part(u32::from(cells.j0) + j as u32, parts_v) as usize;
+    let in_row = division.n_blocks()[0];
+    let of_u = &division.blocks[0][i0..i0 + n_u];
     let mut low = VertexRow::of(k, piece, 0);
     let mut columns = Columns::new(k);
     for j in 0..n_v {
         let high = VertexRow::of(k, piece, j + 1);
         columns.take_in(k, axes, corner, &low);
         columns.take_in(k, axes, corner, &high);
-        let seen = columns.take_in_triangles(k, axes, &low, &high);
-        blocks.are_seen &= !seen & ((1 << n_u) - 1) == 0;
-        if j + 1 == n_v || row_of(j + 1) != row_of(j) {
-            let row = &mut blocks.parts[PARTS * row_of(j)..][..PARTS];
-            columns.give_to(k, n_u, usize::from(cells.i0), parts_u, row);
+        columns.take_in_triangles(k, axes, &low, &high);
+        let row = division.block_of(1, j0 + j);
+        if j + 1 == n_v || division.block_of(1, j0 + j + 1) != row {
+            columns.give_to(k, of_u, &mut blocks[in_row * row..][..in_row]);
             columns = Columns::new(k);
         }
         low = high;
@@ -206,13 +253,15 @@ struct Columns<K: Kernel> {
     least: [K::F; 3],
     most: [K::F; 3],
     steepness: [K::F; 8],
+    /// Those of which n sees all triangles, as bits.
+    seen: u32,
 }
 
 impl<K: Kernel> Columns<K> {
     #[inline(always)]
     fn new(k: K) -> Self {
         let (least, most) = ([k.splat(f32::INFINITY); 3], [k.splat(f32::NEG_INFINITY); 3]);
-        Self { least, most, steepness: [k.splat(NOTHING); 8] }
+        Self { least, most, steepness: [k.splat(NOTHING); 8], seen: u32::MAX }
     }
 
     /// Takes in the vertices of a row.
@@ -226,14 +275,15 @@ impl<K: Kernel> Columns<K> {
         }
     }
 
-    /// Takes in the triangles between two rows; bit k is set if n sees those of column k.
+    /// Takes in the triangles between two rows.
     #[inline(always)]
-    fn take_in_triangles(&mut self, k: K, axes: &Axes<K>, low: &VertexRow<K>, high: &VertexRow<K>) -> u32 {
+    fn take_in_triangles(&mut self, k: K, axes: &Axes<K>, low: &VertexRow<K>, high: &VertexRow<K>) {
         // Two edges of each half, one along u and one along v.
-        let lower = self.take_in_half(k, axes, minus(k, low.high, low.low), minus(k, high.low, low.low));
-        lower & self.take_in_half(k, axes, minus(k, high.high, high.low), minus(k, high.high, low.high))
+        self.seen &= self.take_in_half(k, axes, minus(k, low.high, low.low), minus(k, high.low, low.low));
+        self.seen &= self.take_in_half(k, axes, minus(k, high.high, high.low), minus(k, high.high, low.high));
     }
 
+    /// One triangle of each cell; bit k is set if n sees that of column k.
     #[inline(always)]
     fn take_in_half(&mut self, k: K, axes: &Axes<K>, of_u: [K::F; 3], of_v: [K::F; 3]) -> u32 {
         let ([xu, yu, zu], [xv, yv, zv]) = (axes.along(k, of_u), axes.along(k, of_v));
@@ -269,7 +319,7 @@ impl<K: Kernel> Columns<K> {
 
     /// Gives what is known of each column to its block of a row of blocks.
     #[inline(always)]
-    fn give_to(&self, k: K, n: usize, first: usize, parts_u: u8, row: &mut [Block]) {
+    fn give_to(&self, k: K, blocks: &[u8], row: &mut [Block]) {
         let (mut least, mut most, mut steepness) = ([[0.0; 8]; 3], [[0.0; 8]; 3], [[0.0; 8]; 8]);
         for axis in 0..3 {
             (least[axis], most[axis]) = (k.store(self.least[axis]), k.store(self.most[axis]));
@@ -277,11 +327,12 @@ impl<K: Kernel> Columns<K> {
         for (lanes, of) in steepness.iter_mut().zip(&self.steepness) {
             *lanes = k.store(*of);
         }
-        for lane in 0..n {
-            let block = &mut row[part((first + lane) as u32, parts_u) as usize];
+        for (lane, &block) in blocks.iter().enumerate() {
+            let block = &mut row[usize::from(block)];
             let min = Vec3::new(least[0][lane], least[1][lane], least[2][lane]);
             let max = Vec3::new(most[0][lane], most[1][lane], most[2][lane]);
             block.bounds = block.bounds.union(Bounds { min, max });
+            block.is_seen &= self.seen >> lane & 1 == 1;
             for (most, lanes) in block.steepness.iter_mut().zip(&steepness) {
                 *most = most.max(lanes[lane]);
             }
@@ -319,7 +370,7 @@ mod tests {
 
     #[test]
     fn triangles_are_no_steeper_than_was_measured_however_thin() {
-        let (mut random, mut n_thin) = (Random(0x7419), 0);
+        let (mut random, mut n_thin, mut n_unseen) = (Random(0x7419), 0, 0);
         for k in 0..40_000 {
             let size = 2f64.powf(1.0 + 21.0 * random.point(0.5).x.abs());
             let Some([m_u, m_v]) = axes(random.point(1.0).as_vec3(), random.point(1.0).as_vec3()) else { continue };
@@ -329,28 +380,35 @@ mod tests {
             // Every other one is so thin that roundings decide on which side it is.
             let aside = random.point(if k % 2 == 0 { size } else { 3.0 });
             let corners = [DVec3::ZERO, along, along + aside, 2.0 * along + aside].map(|p| p.round().as_ivec3());
-            let points = corners.map(|corner| corner.to_array());
-            let vertices = LatticeGrid::from_points(&points, 2);
-            let layout = PieceLayout::new(&vertices, CellRect { i0: 0, j0: 0, i1: 1, j1: 1 }, [1, 1]);
+            // One cell of eight in a row, the others without area.
+            let place = k % 8;
+            let points: Vec<[i32; 3]> =
+                (0..18).map(|v| corners[2 * (v / 9) + usize::from(v % 9 > place)].to_array()).collect();
+            let vertices = LatticeGrid::from_points(&points, 9);
+            let layout = PieceLayout::new(&vertices, CellRect { i0: 0, j0: 0, i1: 8, j1: 1 }, [8, 1]);
             let mut bytes = vec![0; layout.bytes()];
             layout.encode(&vertices, &mut bytes);
-            let pieces = [PieceView::new(&bytes)];
-            let measured = simd::run(Measure { frame: &frame, pieces: &pieces, cells: [1, 1] });
-            let Some(Blocks { parts, are_seen: true, .. }) = measured else { continue };
+            let (pieces, division) = ([PieceView::new(&bytes)], &Division::fine([8, 1], 8));
+            let measured = simd::run(Measure { frame: &frame, pieces: &pieces, division });
+            let Some(Blocks { blocks, .. }) = measured else { continue };
+            assert!((0..8).all(|block| block == place || blocks[block].is_seen), "nothing is there that turns away");
+            n_unseen += usize::from(!blocks[place].is_seen);
+            if !blocks[place].is_seen {
+                continue;
+            }
             let [a, b, c, d] = corners;
             for triangle in [[a, b, c], [d, c, b]] {
                 if (triangle[1] - triangle[0]).as_dvec3().cross((triangle[2] - triangle[0]).as_dvec3()) == DVec3::ZERO {
                     continue;
                 }
                 let exact = steepness(&frame, triangle).expect("a triangle that n sees");
-                let most = parts.map(|block| block.steepness);
                 for octant in 0..8 {
-                    let most = most.iter().fold(f32::MIN, |all, of| all.max(of[octant]));
+                    let most = blocks[place].steepness[octant];
                     assert!(exact[octant] <= f64::from(most), "{triangle:?} in octant {octant}: {exact:?}, {most}");
                 }
                 n_thin += k % 2;
             }
         }
-        assert!(n_thin > 1000, "only {n_thin} thin ones");
+        assert!(n_thin > 1000 && n_unseen > 1000, "only {n_thin} thin ones, {n_unseen} that turn away");
     }
 }

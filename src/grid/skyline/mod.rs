@@ -41,7 +41,7 @@ mod octants;
 mod sheet;
 mod view;
 
-pub use sheet::SkylineSheet;
+pub use sheet::{SeenFrom, SkylineSheet};
 pub use view::SkylineView;
 
 use super::frame::{Course, MARGIN_IN_HEIGHT, PACKED, PARTS, PackedFrame};
@@ -83,15 +83,24 @@ impl Skyline {
         bytemuck::cast(self)
     }
 
-    /// Roughly which share of diffuse rays from all over the patch clear it, in percent: those that are higher than an
-    /// angle above the horizontal are the square of its cosine of all, whichever octant they are in.
+    /// Roughly which share of diffuse rays from all over the patch clear it, in percent.
     pub fn openness(&self) -> u32 {
-        let above = |elevation: i8| {
-            let slope = f32::from(elevation.max(0)) / UNITS / PACKED;
-            if elevation < NEVER { 1.0 / (1.0 + slope * slope) } else { 0.0 }
-        };
-        let all = self.elevations.as_flattened();
-        (100.0 * all.iter().map(|elevation| above(*elevation)).sum::<f32>() / all.len() as f32) as u32
+        openness(self.elevations.as_flattened())
+    }
+
+    /// The same from one part.
+    pub fn openness_of_part(&self, part: u32) -> u32 {
+        openness(&self.elevations[part as usize])
+    }
+
+    /// From [`to_words`](Self::to_words).
+    pub fn from_words(words: [u64; Self::WORDS]) -> Self {
+        bytemuck::cast(words)
+    }
+
+    /// The part in which a cell is: 4 times the one along v and the one along u.
+    pub fn part(&self, cell: [u16; 2]) -> u32 {
+        Self::part_of(bytemuck::cast(self.frame), cell)
     }
 
     /// Whether a ray in that direction, which starts on a triangle of cell `cell` or up to `lift` lattice steps above
@@ -105,17 +114,90 @@ impl Skyline {
         word: impl Fn(usize) -> u64,
     ) -> bool {
         let frame: PackedFrame = bytemuck::cast(word(0));
-        let [most_lift, _unused]: [f32; 2] = bytemuck::cast(word(1));
         let [u, v] = frame.part(cell.map(u32::from));
-        let elevations: [i8; 8] = bytemuck::cast(word(2 + PARTS * v as usize + u as usize));
-        let length = k.greatest_of_three(k.abs4(direction)) as f32;
-        let Course { ways: [x, y], shrinks, height } = frame.course(k, k.floats_of(direction));
-        let octant = octants::octant([x, y], shrinks);
-        let elevation = (u64::from_le_bytes(elevations.map(i8::cast_unsigned)) >> (8 * octant)) as i8;
-        let ahead = if x < y { y } else { x };
-        elevation < NEVER
-            && height > f32::from(elevation) / UNITS * ahead + MARGIN_IN_HEIGHT * length
-            && ORDINARY.contains(&length)
-            && lift <= most_lift
+        are_cleared_by(k, frame, word(2 + PARTS * v as usize + u as usize), word(1), direction, lift)
     }
+
+    /// See [`part`](Self::part), of a skyline whose first word is this.
+    #[inline(always)]
+    pub fn part_of(first_word: u64, cell: [u16; 2]) -> u32 {
+        let frame: PackedFrame = bytemuck::cast(first_word);
+        let [u, v] = frame.part(cell.map(u32::from));
+        PARTS as u32 * v + u
+    }
+}
+
+/// A skyline of one part of a patch, of its quarters, as seen along the part's own axes: patches that bend see more of
+/// themselves than of the sky.
+#[derive(Clone, Copy, PartialEq, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct PartSkyline {
+    frame: PackedFrame,
+    /// See [`Skyline`].
+    lift: f32,
+    unused: u32,
+    /// By 2 times the quarter along v and the quarter along u, then by octant.
+    elevations: [[i8; 8]; 4],
+}
+
+impl PartSkyline {
+    /// Words of a part's skyline.
+    pub const WORDS: usize = size_of::<Self>() / size_of::<u64>();
+
+    /// In words.
+    pub fn to_words(self) -> [u64; Self::WORDS] {
+        bytemuck::cast(self)
+    }
+
+    /// See [`Skyline::openness`].
+    pub fn openness(&self) -> u32 {
+        openness(self.elevations.as_flattened())
+    }
+
+    /// See [`Skyline::is_cleared_by`]; the cell is one of the part.
+    #[inline(always)]
+    pub fn is_cleared_by<K: Kernel>(
+        k: K,
+        direction: K::D,
+        cell: [u16; 2],
+        lift: f32,
+        word: impl Fn(usize) -> u64,
+    ) -> bool {
+        let frame: PackedFrame = bytemuck::cast(word(0));
+        let [u, v] = frame.half_part(cell.map(u32::from));
+        are_cleared_by(k, frame, word(2 + 2 * (v as usize % 2) + u as usize % 2), word(1), direction, lift)
+    }
+}
+
+/// Roughly which share of diffuse rays clears such elevations, in percent: those that are higher than an angle above the
+/// horizontal are the square of its cosine of all, whichever octant they are in.
+fn openness(elevations: &[i8]) -> u32 {
+    let above = |elevation: i8| {
+        let slope = f32::from(elevation.max(0)) / UNITS / PACKED;
+        if elevation < NEVER { 1.0 / (1.0 + slope * slope) } else { 0.0 }
+    };
+    (100.0 * elevations.iter().map(|elevation| above(*elevation)).sum::<f32>() / elevations.len() as f32) as u32
+}
+
+/// Whether a ray is higher than these elevations; the first half of a word is the most that it may be lifted.
+#[inline(always)]
+fn are_cleared_by<K: Kernel>(
+    k: K,
+    frame: PackedFrame,
+    elevations: u64,
+    lifts: u64,
+    direction: K::D,
+    lift: f32,
+) -> bool {
+    let [most_lift, _unused]: [f32; 2] = bytemuck::cast(lifts);
+    let elevations: [i8; 8] = bytemuck::cast(elevations);
+    let length = k.greatest_of_three(k.abs4(direction)) as f32;
+    let Course { ways: [x, y], shrinks, height } = frame.course(k, k.floats_of(direction));
+    let octant = octants::octant([x, y], shrinks);
+    let elevation = (u64::from_le_bytes(elevations.map(i8::cast_unsigned)) >> (8 * octant)) as i8;
+    let ahead = if x < y { y } else { x };
+    elevation < NEVER
+        && height > f32::from(elevation) / UNITS * ahead + MARGIN_IN_HEIGHT * length
+        && ORDINARY.contains(&length)
+        && lift <= most_lift
 }

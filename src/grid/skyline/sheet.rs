@@ -1,12 +1,13 @@
 //! The patches near the one that is left, measured along its axes.
 
-use super::measure::{Block, Blocks, Measure, MeasureBox};
+use super::measure::{Block, Blocks, Division, Measure, MeasureBox};
 use super::octants::Extent;
-use crate::grid::frame::{PARTS, PackedFrame, axes, part, parts_per_cell};
+use crate::grid::frame::{PARTS, PackedFrame, axes, parts_per_cell};
 use crate::grid::{LatticeRay, PieceView, leaves_below};
 use crate::math::Bounds;
 use crate::math::simd;
 use glam::{DVec2, IVec3, Vec3};
+use std::ops::Range;
 
 /// Rays may start so far above the patch, as a share of its length or width.
 const LIFT: f32 = 1.0 / 32.0;
@@ -22,42 +23,78 @@ pub(super) struct Frame {
     pub packed: PackedFrame,
 }
 
-/// A patch that may be of the sheet: n sees all of its triangles.
+/// What there is of a patch in the sheet: the blocks of which n sees all triangles.
 pub(super) struct NearPatch {
-    /// By 4 times the part along v and the part along u.
-    pub blocks: [Block; PARTS * PARTS],
-    /// Around all of them.
-    pub whole: Bounds,
-    pub sides: Sides,
+    pub blocks: Vec<Block>,
+    pub outline: Outline,
 }
 
 /// Vertices of the sides v = 0, u = 1, v = 1, u = 0, one after the other around the patch, each once.
-pub(super) type Sides = [Vec<[i32; 3]>; 4];
+type Sides = [Vec<[i32; 3]>; 4];
+
+/// What is around blocks of a patch.
+pub(super) struct Outline {
+    /// Vertices one after the other, each once, as one goes around counter-clockwise.
+    pub lines: Vec<Vec<[i32; 3]>>,
+    /// Whether they are the patch's sides.
+    pub is_whole: bool,
+}
+
+/// A part of the patch, or a quarter of one, all of whose triangles n sees.
+pub(super) struct LeftPart {
+    /// 4 times the part along v and the part along u, or 2 times the quarter along v and the quarter along u.
+    pub number: usize,
+    pub bounds: Bounds,
+    /// Of its triangles, in the frame.
+    pub normals: Vec<Vec3>,
+}
+
+/// How finely near patches are looked at.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum SeenFrom {
+    /// Part by part, for all parts of the patch that is left.
+    Patch,
+    /// Cell by cell, for the quarters of one of its parts, along whose axes all is measured. Rays may start so far above it, in lattice
+    /// steps.
+    Part {
+        /// 4 times the one along v and the one along u.
+        number: usize,
+        /// Less than what the patch would allow for.
+        lift: f32,
+    },
+}
 
 /// A patch and others near it.
 pub struct SkylineSheet {
     pub(super) frame: Frame,
-    /// The one that is left, and others that share corners with it.
+    seen_from: SeenFrom,
+    /// Of the patch that is left.
+    corners: [[i32; 3]; 4],
+    /// How large it is.
+    pub(super) own: Bounds,
+    pub(super) parts: Vec<LeftPart>,
+    /// That one first, then others that share corners with it.
     pub(super) patches: Vec<NearPatch>,
-    /// Around all others.
+    /// Around all others, and what is not seen of those.
     pub(super) others: Vec<Extent>,
-    /// Normals of the first patch's triangles, in the frame, block by block.
-    pub(super) normals: [Vec<Vec3>; PARTS * PARTS],
+}
+
+/// Where the corners of some cells lead along u and along v, twice.
+fn lead([a, b, c, d]: [IVec3; 4]) -> [Vec3; 2] {
+    [(b - a).as_vec3() + (c - d).as_vec3(), (d - a).as_vec3() + (c - b).as_vec3()]
 }
 
 impl Frame {
-    fn new(sides: &Sides, cells: [usize; 2], is_turned: bool) -> Option<Self> {
-        let [a, b, c, d] = sides.each_ref().map(|side| IVec3::from_array(side[0]));
-        let (of_u, of_v) = ((b - a).as_vec3() + (c - d).as_vec3(), (d - a).as_vec3() + (c - b).as_vec3());
+    /// As the cells between these corners see it, of a patch of so many cells.
+    fn new(corners: [[i32; 3]; 4], lift: f32, cells: [usize; 2], is_turned: bool) -> Option<Self> {
+        let corners = corners.map(IVec3::from_array);
+        let [a, _, c, _] = corners;
+        let [of_u, of_v] = lead(corners);
         let along = axes(of_u, of_v)?;
         let [m_u, m_v] = along;
         let n = if is_turned { m_v.cross(m_u) } else { m_u.cross(m_v) };
-        Some(Self {
-            axes: [m_u, m_v, n],
-            origin: a + (c - a) / 2,
-            lift: 0.5 * LIFT * of_u.length().min(of_v.length()),
-            packed: PackedFrame::new(along, cells.map(parts_per_cell), is_turned),
-        })
+        let packed = PackedFrame::new(along, cells.map(parts_per_cell), is_turned);
+        Some(Self { axes: [m_u, m_v, n], origin: a + (c - a) / 2, lift, packed })
     }
 
     /// Where above x and y a lattice point is.
@@ -78,55 +115,208 @@ impl Frame {
     }
 }
 
+/// Blocks along the sides of patches around a part, its own and others.
+const FINE: [usize; 2] = [16, 8];
+
+impl SeenFrom {
+    fn division(self, cells: [usize; 2], most: usize) -> Division {
+        match self {
+            Self::Patch => Division::in_parts(cells),
+            Self::Part { .. } => Division::fine(cells, most),
+        }
+    }
+}
+
 impl SkylineSheet {
     /// Of all pieces of a patch on which the ray starts, seen from the side to which it leaves; `None` if that is no
-    /// side, or bent too much.
-    pub fn new(pieces: &[PieceView<'_>], ray: &LatticeRay) -> Option<Self> {
+    /// side.
+    pub fn new(pieces: &[PieceView<'_>], ray: &LatticeRay, seen_from: SeenFrom) -> Option<Self> {
         let cells = cells_of(pieces);
         let sides = sides_of(pieces, cells);
         let is_turned = pieces.iter().any(|piece| leaves_below(piece, ray));
-        let frame = Frame::new(&sides, cells, is_turned)?;
-        let Blocks { parts, whole, are_seen } = simd::run(Measure { frame: &frame, pieces, cells })?;
-        let normals = normals(&frame, pieces, cells);
-        let own = NearPatch { blocks: parts, whole, sides };
-        are_seen.then(|| Self { frame, patches: vec![own], others: Vec::new(), normals })
+        let corners = sides.each_ref().map(|side| side[0]);
+        let [of_u, of_v] = lead(corners.map(IVec3::from_array));
+        let most_lift = 0.5 * LIFT * of_u.length().min(of_v.length());
+        let (of_frame, lift) = match seen_from {
+            SeenFrom::Patch => (corners, most_lift),
+            SeenFrom::Part { number, lift } => {
+                (corners_of_part(number, &VertexGrid::of(pieces, cells), cells)?, lift.min(most_lift))
+            }
+        };
+        let frame = Frame::new(of_frame, lift, cells, is_turned)?;
+        let division = seen_from.division(cells, FINE[0]);
+        let blocks = simd::run(Measure { frame: &frame, pieces, division: &division })?;
+        let parts = parts_seen(seen_from, &frame, &blocks, &division, pieces, cells);
+        let (own, patches, others) = (blocks.whole, Vec::new(), Vec::new());
+        let mut sheet = Self { frame, seen_from, corners, own, parts, patches, others };
+        sheet.add_seen(blocks, &division, pieces, cells, sides);
+        Some(sheet)
+    }
+
+    /// Adds what n sees of a patch to the sheet, and boxes around the rest to the others.
+    fn add_seen(
+        &mut self,
+        blocks: Blocks,
+        division: &Division,
+        pieces: &[PieceView<'_>],
+        cells: [usize; 2],
+        sides: Sides,
+    ) {
+        let blocks = blocks.blocks;
+        let is_whole = blocks.iter().all(|block| block.is_seen);
+        let lines = if is_whole { sides.into() } else { lines_around(&blocks, division, pieces, cells, sides) };
+        let (seen, unseen): (Vec<Block>, Vec<Block>) = blocks.into_iter().partition(|block| block.is_seen);
+        self.others.extend(unseen.iter().map(|block| block.extent));
+        self.patches.push(NearPatch { blocks: seen, outline: Outline { lines, is_whole } });
     }
 
     /// Adds another patch, all pieces of it; returns false, and does nothing, if it cannot be measured.
     pub fn add(&mut self, pieces: &[PieceView<'_>]) -> bool {
         let (frame, cells) = (&self.frame, cells_of(pieces));
-        let own = self.patches[0].sides.each_ref().map(|side| side[0]);
-        let whole = if pieces.iter().any(|piece| corners_of(piece).iter().any(|corner| own.contains(corner))) {
-            let Some(blocks) = simd::run(Measure { frame, pieces, cells }) else { return false };
-            let Blocks { parts, whole, are_seen } = blocks;
-            if are_seen {
-                self.patches.push(NearPatch { blocks: parts, whole, sides: sides_of(pieces, cells) });
-                return true;
+        let shares_corner = |piece: &PieceView<'_>| corners_of(piece).iter().any(|c| self.corners.contains(c));
+        if pieces.iter().any(shares_corner) {
+            let division = self.seen_from.division(cells, FINE[1]);
+            let Some(blocks) = simd::run(Measure { frame, pieces, division: &division }) else { return false };
+            match blocks.blocks.iter().any(|block| block.is_seen) {
+                true => self.add_seen(blocks, &division, pieces, cells, sides_of(pieces, cells)),
+                false => self.others.push(Extent::around(&blocks.whole)),
             }
-            whole
         } else {
             let Some(whole) = simd::run(MeasureBox { frame, pieces }) else { return false };
-            whole
-        };
-        self.others.push(Extent::around(&whole));
+            self.others.push(Extent::around(&whole));
+        }
         true
     }
 }
 
-/// The normals of a patch's triangles in the frame, on the side of n, block by block.
-fn normals(frame: &Frame, pieces: &[PieceView<'_>], cells: [usize; 2]) -> [Vec<Vec3>; PARTS * PARTS] {
-    let [parts_u, parts_v] = cells.map(parts_per_cell);
-    let mut normals: [Vec<Vec3>; PARTS * PARTS] = Default::default();
+/// The parts that are left, as far as all of their blocks are seen.
+fn parts_seen(
+    seen_from: SeenFrom,
+    frame: &Frame,
+    blocks: &Blocks,
+    division: &Division,
+    pieces: &[PieceView<'_>],
+    cells: [usize; 2],
+) -> Vec<LeftPart> {
+    let in_parts = match seen_from {
+        SeenFrom::Patch => Division::in_parts(cells),
+        SeenFrom::Part { .. } => Division::in_half_parts(cells),
+    };
+    let mut normals = normals(frame, pieces, &in_parts);
+    let [of_u, of_v] = [0, 1].map(|axis| in_parts.ranges(axis));
+    let mut parts = Vec::new();
+    for (b, a) in (0..of_v.len()).flat_map(|b| (0..of_u.len()).map(move |a| (b, a))) {
+        let number = match seen_from {
+            SeenFrom::Patch => PARTS * b + a,
+            SeenFrom::Part { number, .. } if [a / 2, b / 2] == [number % PARTS, number / PARTS] => 2 * (b % 2) + a % 2,
+            SeenFrom::Part { .. } => continue,
+        };
+        if of_u[a].is_empty() || of_v[b].is_empty() {
+            continue;
+        }
+        let blocks_of = |axis: usize, cells: &Range<usize>| {
+            division.block_of(axis, cells.start)..=division.block_of(axis, cells.end - 1)
+        };
+        let in_row = division.n_blocks()[0];
+        let places = blocks_of(1, &of_v[b])
+            .flat_map(|row| blocks_of(0, &of_u[a]).map(move |column| &blocks.blocks[in_row * row + column]));
+        let (bounds, is_seen) = places.fold((Bounds::EMPTY, true), |(bounds, is_seen), block| {
+            (bounds.union(block.bounds), is_seen && block.is_seen)
+        });
+        if is_seen {
+            let normals = std::mem::take(&mut normals[in_parts.n_blocks()[0] * b + a]);
+            parts.push(LeftPart { number, bounds, normals });
+        }
+    }
+    parts
+}
+
+/// What is around the blocks that are seen.
+fn lines_around(
+    blocks: &[Block],
+    division: &Division,
+    pieces: &[PieceView<'_>],
+    cells: [usize; 2],
+    sides: Sides,
+) -> Vec<Vec<[i32; 3]>> {
+    let ([n_a, n_b], vertices) = (division.n_blocks(), VertexGrid::of(pieces, cells));
+    let is_seen = |a: usize, b: usize| blocks[n_a * b + a].is_seen;
+    let along =
+        |side: usize| (0..[n_a, n_b][side % 2]).map(move |k| [[k, 0], [n_a - 1, k], [k, n_b - 1], [0, k]][side]);
+    // A side of the patch in one line, where that can be: other patches have it so.
+    let is_whole = [0, 1, 2, 3].map(|side| along(side).all(|[a, b]| is_seen(a, b)));
+    let mut lines: Vec<Vec<[i32; 3]>> =
+        sides.into_iter().zip(is_whole).filter_map(|(line, is_whole)| is_whole.then_some(line)).collect();
+    let [of_u, of_v] = [0, 1].map(|axis| division.ranges(axis));
+    for (b, a) in (0..n_b).flat_map(|b| (0..n_a).map(move |a| (b, a))).filter(|&(b, a)| is_seen(a, b)) {
+        let (Range { start: i0, end: i1 }, Range { start: j0, end: j1 }) = (of_u[a].clone(), of_v[b].clone());
+        let is_open = |is_last: bool, side: usize, [a, b]: [usize; 2]| match is_last {
+            true => !is_whole[side],
+            false => !is_seen(a, b),
+        };
+        if is_open(b == 0, 0, [a, b.wrapping_sub(1)]) {
+            lines.push((i0..=i1).map(|i| vertices.at(i, j0)).collect());
+        }
+        if is_open(a + 1 == n_a, 1, [a + 1, b]) {
+            lines.push((j0..=j1).map(|j| vertices.at(i1, j)).collect());
+        }
+        if is_open(b + 1 == n_b, 2, [a, b + 1]) {
+            lines.push((i0..=i1).rev().map(|i| vertices.at(i, j1)).collect());
+        }
+        if is_open(a == 0, 3, [a.wrapping_sub(1), b]) {
+            lines.push((j0..=j1).rev().map(|j| vertices.at(i0, j)).collect());
+        }
+    }
+    lines.iter_mut().for_each(Vec::dedup);
+    lines
+}
+
+/// The corners of a part, as the patch has them; `None` if there is no such part.
+fn corners_of_part(part: usize, vertices: &VertexGrid, cells: [usize; 2]) -> Option<[[i32; 3]; 4]> {
+    let in_parts = Division::in_parts(cells);
+    let Range { start: i0, end: i1 } = *in_parts.ranges(0).get(part % PARTS)?;
+    let Range { start: j0, end: j1 } = *in_parts.ranges(1).get(part / PARTS)?;
+    Some([[i0, j0], [i1, j0], [i1, j1], [i0, j1]].map(|[i, j]| vertices.at(i, j)))
+}
+
+/// The vertices of a patch, row by row.
+struct VertexGrid {
+    columns: usize,
+    vertices: Vec<[i32; 3]>,
+}
+
+impl VertexGrid {
+    fn of(pieces: &[PieceView<'_>], [n_u, n_v]: [usize; 2]) -> Self {
+        let columns = n_u + 1;
+        let mut vertices = vec![[0; 3]; columns * (n_v + 1)];
+        for piece in pieces {
+            let (from, [m_u, m_v]) = (piece.cells(), piece.cells().size());
+            for (i, j) in (0..=m_v).flat_map(|j| (0..=m_u).map(move |i| (i, j))) {
+                vertices[(usize::from(from.j0) + j) * columns + usize::from(from.i0) + i] = piece.vertex(i, j);
+            }
+        }
+        Self { columns, vertices }
+    }
+
+    fn at(&self, i: usize, j: usize) -> [i32; 3] {
+        self.vertices[j * self.columns + i]
+    }
+}
+
+/// The normals of a patch's triangles in the frame, on the side of n, part by part.
+fn normals(frame: &Frame, pieces: &[PieceView<'_>], in_parts: &Division) -> Vec<Vec<Vec3>> {
+    let [n_a, n_b] = in_parts.n_blocks();
+    let mut normals = vec![Vec::new(); n_a * n_b];
     for piece in pieces {
         let (from, [n_u, n_v]) = (piece.cells(), piece.cells().size());
         for (i, j) in (0..n_v).flat_map(|j| (0..n_u).map(move |i| (i, j))) {
-            let (u, v) = (part(u32::from(from.i0) + i as u32, parts_u), part(u32::from(from.j0) + j as u32, parts_v));
-            let block = PARTS * v as usize + u as usize;
+            let part_u = in_parts.block_of(0, usize::from(from.i0) + i);
+            let part_v = in_parts.block_of(1, usize::from(from.j0) + j);
             let at = |di: usize, dj: usize| IVec3::from_array(piece.vertex(i + di, j + dj)).as_dvec3();
             let [a, b, c, d] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
             for normal in [(b - a).cross(c - a), (c - d).cross(b - d)] {
                 let [x, y, z] = frame.axes.map(|axis| axis.as_dvec3().dot(normal));
-                normals[block].push(Vec3::new(x as f32, y as f32, z as f32) * z.signum() as f32);
+                normals[n_a * part_v + part_u].push(Vec3::new(x as f32, y as f32, z as f32) * z.signum() as f32);
             }
         }
     }

@@ -1,8 +1,8 @@
 //! The view from a patch's parts: what is near, then boxes of all that is far.
 
 use super::octants::{Between, Extent, NOTHING, octant};
-use super::sheet::{Frame, NearPatch, SkylineSheet};
-use super::{NEVER, Skyline, UNITS};
+use super::sheet::{Frame, LeftPart, NearPatch, SkylineSheet};
+use super::{NEVER, PartSkyline, Skyline, UNITS};
 use crate::math::Bounds;
 use crate::math::simd::{self, Kernel, Task};
 use glam::{DVec2, Vec2, Vec3};
@@ -57,33 +57,29 @@ struct Part {
 }
 
 impl SkylineSheet {
-    /// The view from the first of the patches, past all of them; `None` if no part of it can be left.
-    pub fn view(self) -> Option<SkylineView> {
-        let Self { frame, patches, others, normals } = self;
-        let border = Border::of(&frame, &sides(&patches));
-        let own = patches[0].whole;
+    /// The view from the first of the patches, past all of them.
+    pub fn view(self) -> SkylineView {
+        let Self { frame, own, parts: left, patches, others, .. } = self;
+        let border = Border::of(&frame, &patches);
         let widths = 0.5 * (own.max - own.min);
         let margin = margin(&frame, widths);
         let (mut parts, mut everywhere) = (Vec::new(), Bounds::EMPTY);
-        for (number, block) in patches[0].blocks.iter().enumerate().filter(|(_, block)| !block.bounds.is_empty()) {
-            let around = Bounds { min: block.bounds.min - margin, max: block.bounds.max + margin };
+        for LeftPart { number, bounds, normals } in left {
+            let around = Bounds { min: bounds.min - margin, max: bounds.max + margin };
             let Some(within) = border.clearing(&around, widths) else { continue };
             let from = Start::in_box(&around);
             let look = LookAround { from, within, patches: &patches, others: &others };
             let [near, far] = simd::run(look);
-            if normals[number].iter().all(|normal| lets_pass(&near, *normal)) {
+            if normals.iter().all(|normal| lets_pass(&near, *normal)) {
                 let higher = |[near, far]: [f32; 2]| if near > far { near } else { far };
                 let elevations = std::array::from_fn(|octant| higher([near[octant], far[octant]]));
                 parts.push(Part { number, from, elevations });
                 everywhere = everywhere.union(around);
             }
         }
-        if parts.is_empty() {
-            return None;
-        }
         let mut view = SkylineView { frame, parts, from: Start::in_box(&everywhere), lowest: [NOTHING; 8] };
         view.see(&Sight { extent: Extent::NONE, gain: 0.0 });
-        Some(view)
+        view
     }
 }
 
@@ -95,13 +91,17 @@ fn margin(frame: &Frame, widths: Vec3) -> Vec3 {
     Vec3::new(aside.x, aside.y, STEPS * lengths.z + ROUNDING * widths.truncate().max_element() * lengths.z / lengths.x)
 }
 
-/// A side of a patch.
+/// A line around what there is of a patch.
 struct Side<'a> {
     ends: [[i32; 3]; 2],
     points: &'a [[i32; 3]],
 }
 
-impl Side<'_> {
+impl<'a> Side<'a> {
+    fn new(points: &'a [[i32; 3]]) -> Self {
+        Self { ends: [points[0], points[points.len() - 1]], points }
+    }
+
     /// Whether two sides are one, run through from opposite ends.
     fn is_joined_to(&self, other: &Self) -> bool {
         self.ends[0] == other.ends[1]
@@ -111,16 +111,67 @@ impl Side<'_> {
     }
 }
 
-/// All sides that are no points.
-fn sides(patches: &[NearPatch]) -> Vec<Side<'_>> {
-    let all = patches.iter().flat_map(|patch| &patch.sides).filter(|points| points.len() > 1);
-    all.map(|points| Side { ends: [points[0], points[points.len() - 1]], points }).collect()
+/// The lines around patches that are no points, but for those that are joined to exactly one other.
+fn open_sides(patches: &[NearPatch]) -> Vec<Side<'_>> {
+    let lines = patches.iter().flat_map(|patch| &patch.outline.lines).filter(|points| points.len() > 1);
+    let sides: Vec<Side<'_>> = lines.map(|points| Side::new(points)).collect();
+    let partners: Vec<Option<usize>> = (0..sides.len()).map(|side| partner(&sides, side)).collect();
+    let is_open = |number: usize| partners[number].is_none_or(|partner| partners[partner] != Some(number));
+    sides.into_iter().enumerate().filter_map(|(number, side)| is_open(number).then_some(side)).collect()
 }
 
 /// The only side that is the same as this one.
 fn partner(sides: &[Side<'_>], side: usize) -> Option<usize> {
     let mut partners = (0..sides.len()).filter(|other| *other != side && sides[side].is_joined_to(&sides[*other]));
     partners.next().filter(|_| partners.next().is_none())
+}
+
+/// Leaves out what is run through as often from one end as from the other, edge by edge: where not all blocks of a patch
+/// are there, its lines are not those of the patches beyond.
+fn open_lines(sides: &[Side<'_>]) -> Vec<Vec<[i32; 3]>> {
+    let mut edges: Vec<Edge> = Vec::new();
+    for (line, side) in sides.iter().enumerate() {
+        edges.extend(side.points.windows(2).enumerate().map(|(place, ends)| Edge::new(ends, [line, place])));
+    }
+    edges.sort_unstable_by_key(|edge| (edge.ends, edge.place));
+    let mut is_open: Vec<Vec<bool>> = sides.iter().map(|side| vec![true; side.points.len() - 1]).collect();
+    for same in edges.chunk_by(|a, b| a.ends == b.ends) {
+        let n_back = same.iter().filter(|edge| edge.is_back).count();
+        let n_joined = n_back.min(same.len() - n_back);
+        for is_back in [false, true] {
+            for edge in same.iter().filter(|edge| edge.is_back == is_back).take(n_joined) {
+                is_open[edge.place[0]][edge.place[1]] = false;
+            }
+        }
+    }
+    let mut lines = Vec::new();
+    for (side, is_open) in sides.iter().zip(&is_open) {
+        let mut place = 0;
+        for run in is_open.chunk_by(|a, b| a == b) {
+            if run[0] {
+                lines.push(side.points[place..=place + run.len()].to_vec());
+            }
+            place += run.len();
+        }
+    }
+    lines
+}
+
+/// An edge of a line.
+struct Edge {
+    /// In order.
+    ends: [[i32; 3]; 2],
+    /// Whether the line runs from the second to the first.
+    is_back: bool,
+    /// Which line, and which of its edges.
+    place: [usize; 2],
+}
+
+impl Edge {
+    fn new(ends: &[[i32; 3]], place: [usize; 2]) -> Self {
+        let [a, b] = [ends[0], ends[1]];
+        Self { ends: [a.min(b), a.max(b)], is_back: b < a, place }
+    }
 }
 
 /// The open sides of the sheet.
@@ -149,15 +200,14 @@ fn away(from: DVec2, low: DVec2, high: DVec2) -> DVec2 {
 }
 
 impl Border {
-    fn of(frame: &Frame, sides: &[Side<'_>]) -> Self {
-        let partners: Vec<Option<usize>> = (0..sides.len()).map(|side| partner(sides, side)).collect();
-        let mut open = Vec::new();
-        for (number, side) in sides.iter().enumerate() {
-            if partners[number].is_none_or(|partner| partners[partner] != Some(number)) {
-                open.push(OpenSide::new(side.points.iter().map(|p| frame.place(*p)).collect()));
-            }
-        }
-        Self { sides: open }
+    fn of(frame: &Frame, patches: &[NearPatch]) -> Self {
+        let placed = |points: &[[i32; 3]]| OpenSide::new(points.iter().map(|p| frame.place(*p)).collect());
+        let sides = open_sides(patches);
+        let sides = match patches.iter().all(|patch| patch.outline.is_whole) {
+            true => sides.iter().map(|side| placed(side.points)).collect(),
+            false => open_lines(&sides).iter().map(|line| placed(line)).collect(),
+        };
+        Self { sides }
     }
 
     /// A rectangle around that box which no edge enters, and over each of whose points there is one of the sheet; its
@@ -179,8 +229,33 @@ impl Border {
             }
         }
         let reach = reach * (1.0 - f64::from(ROUNDING)) * widths;
-        let clearing = [middle - reach, middle + reach].map(|corner| corner.as_vec2());
-        (windings * windings == 1 && reach.is_finite() && is_within(around, clearing)).then_some(clearing)
+        let square = [middle - reach, middle + reach];
+        if windings * windings != 1 || !reach.is_finite() || !is_within(around, square.map(DVec2::as_vec2)) {
+            return None;
+        }
+        Some(self.grown(square, f64::from(ROUNDING) * widths).map(DVec2::as_vec2))
+    }
+
+    /// The rectangle as far as it may grow, side by side, until an edge is as near as the margin.
+    fn grown(&self, [mut low, mut high]: [DVec2; 2], margin: DVec2) -> [DVec2; 2] {
+        for axis in 0..2 {
+            let across = 1 - axis;
+            let (mut below, mut above) = (f64::NEG_INFINITY, f64::INFINITY);
+            let is_beside = |a: f64, b: f64| b >= low[across] && a <= high[across];
+            for side in self.sides.iter().filter(|side| is_beside(side.low[across], side.high[across])) {
+                for ends in side.places.windows(2) {
+                    let (least, most) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+                    if is_beside(least[across], most[across]) {
+                        match most[axis] < low[axis] {
+                            true => below = below.max(most[axis]),
+                            false => above = above.min(least[axis]),
+                        }
+                    }
+                }
+            }
+            (low[axis], high[axis]) = (low[axis].min(below + margin[axis]), high[axis].max(above - margin[axis]));
+        }
+        [low, high]
     }
 }
 
@@ -201,6 +276,18 @@ fn is_apart(b: &Bounds, [low, high]: [Vec2; 2]) -> bool {
     b.max.x < low.x || b.max.y < low.y || b.min.x > high.x || b.min.y > high.y
 }
 
+/// What of a box is not within: at each of the four sides.
+fn beyond(b: &Bounds, [low, high]: [Vec2; 2]) -> impl Iterator<Item = Bounds> {
+    let (below, above) = (b.max.min(low.extend(f32::INFINITY)), b.min.max(high.extend(f32::NEG_INFINITY)));
+    let sides = [
+        Bounds { max: Vec3 { x: below.x, ..b.max }, ..*b },
+        Bounds { max: Vec3 { y: below.y, ..b.max }, ..*b },
+        Bounds { min: Vec3 { x: above.x, ..b.min }, ..*b },
+        Bounds { min: Vec3 { y: above.y, ..b.min }, ..*b },
+    ];
+    sides.into_iter().filter(|side| side.min.cmple(side.max).all())
+}
+
 /// Finds the elevations of what is near a part, and of other patches that are near.
 struct LookAround<'a> {
     from: Start,
@@ -219,15 +306,17 @@ impl Task for LookAround<'_> {
         let (mut near, mut far) = (k.splat(NOTHING), k.splat(NOTHING));
         for patch in patches {
             for block in &patch.blocks {
-                if block.bounds.is_empty() {
-                    continue;
-                }
                 let between = Between::of(k, &from.extent, &block.extent);
                 if !is_apart(&block.bounds, within) {
                     near = k.max(near, between.only(k, k.load(&block.steepness)));
                 }
-                if !is_within(&block.bounds, within) {
+                if is_apart(&block.bounds, within) {
                     far = k.max(far, between.elevations(k, from.floor));
+                } else if !is_within(&block.bounds, within) {
+                    for beyond in beyond(&block.bounds, within) {
+                        let between = Between::of(k, &from.extent, &Extent::of(k, &beyond));
+                        far = k.max(far, between.elevations(k, from.floor));
+                    }
                 }
             }
         }
@@ -298,6 +387,11 @@ impl Task for See<'_> {
 }
 
 impl SkylineView {
+    /// Whether no part can be left, whatever else there is.
+    pub fn is_shut(&self) -> bool {
+        self.parts.is_empty()
+    }
+
     /// A box of the lattice as it is seen.
     pub fn look(&self, at: &Bounds) -> Sight {
         simd::run(Look { view: self, at })
@@ -316,6 +410,16 @@ impl SkylineView {
         }
         skyline
     }
+
+    /// The same as seen from a part.
+    pub fn part_skyline(&self) -> PartSkyline {
+        let elevations = [[NEVER; 8]; 4];
+        let mut skyline = PartSkyline { frame: self.frame.packed, lift: self.frame.lift, unused: 0, elevations };
+        for part in &self.parts {
+            skyline.elevations[part.number] = part.elevations.map(rounded_up);
+        }
+        skyline
+    }
 }
 
 /// In units of the skyline, with some margin; [`NEVER`] if it is too much.
@@ -326,7 +430,10 @@ fn rounded_up(elevation: f32) -> i8 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::measure::Block;
+    use super::super::sheet::Outline;
     use super::*;
+    use crate::grid::tests::support::Random;
 
     /// The border of a square of half-width `r`, that many times around.
     fn square(r: f64, times: usize) -> Border {
@@ -340,11 +447,59 @@ mod tests {
         let box_at = |x: f32| Bounds { min: Vec3::new(x - 1.0, -1.0, 0.0), max: Vec3::new(x + 1.0, 1.0, 1.0) };
         let clearing = |border: &Border, x: f32| border.clearing(&box_at(x), Vec3::ONE);
         let [low, high] = clearing(&square(4.0, 1), 1.0).expect("room for the box");
-        assert!(low.cmpgt(Vec2::new(-2.0, -3.0)).all() && high.cmplt(Vec2::new(4.0, 3.0)).all(), "{low} {high}");
+        let is_near = |corner: Vec2, to: f32| (corner - to).abs().max_element() < 0.01;
+        assert!(low.min_element() > -4.0 && high.max_element() < 4.0, "{low} {high}");
+        assert!(is_near(low, -4.0) && is_near(high, 4.0), "as large as may be: {low} {high}");
+        // A spike from the left: the clearing grows to the other sides.
+        let mut spiked = square(4.0, 1);
+        spiked
+            .sides
+            .push(OpenSide::new([(-4.0, 0.5), (-0.5, 0.0), (-4.0, 0.5)].map(|(x, y)| DVec2::new(x, y)).to_vec()));
+        let [low, high] = clearing(&spiked, 1.0).expect("room beside the spike");
+        assert!((-0.5..-0.49).contains(&low.x) && is_near(high, 4.0), "{low} {high}");
         assert!(clearing(&square(4.0, 1), 3.5).is_none(), "the border enters the box");
         assert!(clearing(&square(4.0, 1), 6.0).is_none(), "outside");
         assert!(clearing(&square(4.0, 2), 1.0).is_none(), "two of the sheet above each place");
         assert!(clearing(&square(4.0, 0), 1.0).is_none(), "no border");
+    }
+
+    #[test]
+    fn what_of_a_box_is_beyond_a_rectangle_is_all_there() {
+        let mut random = Random(0xbe1);
+        let mut n_beyond = 0;
+        for _ in 0..500 {
+            let mut rectangle = || -> Bounds { (0..2).map(|_| random.point(1.0).as_vec3()).collect() };
+            let (b, within) = (rectangle(), rectangle());
+            let within = [within.min.truncate(), within.max.truncate()];
+            let boxes: Vec<Bounds> = beyond(&b, within).collect();
+            for _ in 0..50 {
+                let p = b.min + (random.point(0.5) + 0.5).as_vec3() * (b.max - b.min);
+                let is_beyond = p.truncate().cmplt(within[0]).any() || p.truncate().cmpgt(within[1]).any();
+                let is_there = |b: &Bounds| b.min.cmple(p).all() && p.cmple(b.max).all();
+                assert!(!is_beyond || boxes.iter().any(is_there), "{p} of {b:?} beyond {within:?}");
+                n_beyond += usize::from(is_beyond);
+            }
+            assert!(boxes.iter().all(|of| b.union(*of) == b), "no more than the box");
+        }
+        assert!(n_beyond > 1000);
+    }
+
+    #[test]
+    fn a_block_that_reaches_beyond_the_clearing_stands_there_as_a_box() {
+        let at =
+            |x: [f32; 2], z: [f32; 2]| Bounds { min: Vec3::new(x[0], -1.0, z[0]), max: Vec3::new(x[1], 1.0, z[1]) };
+        let from = Start::in_box(&at([-1.0, 1.0], [0.0, 0.0]));
+        let block = |bounds: Bounds| Block { extent: Extent::around(&bounds), bounds, ..Block::EMPTY };
+        let outline = Outline { lines: Vec::new(), is_whole: true };
+        let patches = &[NearPatch { blocks: vec![block(at([2.0, 6.0], [0.0, 50.0]))], outline }];
+        let far = |to: f32| {
+            let within = [Vec2::new(-8.0, -8.0), Vec2::new(to, 8.0)];
+            simd::run(LookAround { from, within, patches, others: &[] })[1][0]
+        };
+        assert!(far(7.0) <= NOTHING, "it is within");
+        // Of what is beyond 5, at most 50 above, 4 ahead at least.
+        assert!((12.5..13.0).contains(&far(5.0)), "{}", far(5.0));
+        assert!((50.0..51.0).contains(&far(1.0)), "all of it, 1 ahead: {}", far(1.0));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::slow::{meet, triangles};
 use super::support::{Piece, Random, whole};
-use crate::grid::{LatticeRay, Skyline, SkylineSheet, TriangleId};
+use crate::grid::{LatticeRay, SeenFrom, Skyline, SkylineSheet, SkylineView, TriangleId};
 use crate::ids::PatchId;
 use crate::math::simd::{Kernel, Portable};
 use glam::{DVec3, IVec3};
@@ -26,14 +26,19 @@ fn on_cylinder(angles: [f64; 2], heights: [f64; 2]) -> Vec<[i32; 3]> {
 
 /// The skyline of the first of these patches, on the side to which a ray from the middle leaves along `direction`.
 fn skyline_of(patches: &[Vec<[i32; 3]>], direction: DVec3) -> Option<Skyline> {
+    view_from(patches, direction, SeenFrom::Patch).map(|view| view.skyline())
+}
+
+/// What is seen from there.
+fn view_from(patches: &[Vec<[i32; 3]>], direction: DVec3, seen_from: SeenFrom) -> Option<SkylineView> {
     let pieces: Vec<Piece> = patches.iter().map(|vertices| Piece::new(vertices, whole(8, 8))).collect();
     let start = TriangleId::new(PATCH, 4, 4, 0);
     let ray = LatticeRay::new(IVec3::from_array(patches[0][40]).as_dvec3(), direction, f32::INFINITY, start);
-    let mut sheet = SkylineSheet::new(&[pieces[0].view()], &ray)?;
+    let mut sheet = SkylineSheet::new(&[pieces[0].view()], &ray, seen_from)?;
     for piece in &pieces[1..] {
         assert!(sheet.add(&[piece.view()]));
     }
-    Some(sheet.view()?.skyline())
+    Some(sheet.view())
 }
 
 fn is_cleared(skyline: Option<Skyline>, direction: DVec3, cell: [u16; 2], lift: f32) -> bool {
@@ -98,16 +103,22 @@ fn rays_start_no_higher_than_the_lift() {
     assert!(!is_cleared(skyline, DVec3::Z, [4, 4], f32::NAN));
 }
 
-#[test]
-fn a_patch_that_turns_away_from_itself_has_no_skyline() {
-    assert!(skyline_of(&nine(60.0), DVec3::Z).is_some());
-    assert_eq!(skyline_of(&nine(200.0), DVec3::Z), None);
-    let is_sheet = |width: f64| {
-        let piece = Piece::new(&nine(width)[0], whole(8, 8));
-        let ray = LatticeRay::new(DVec3::ZERO, DVec3::Z, f32::INFINITY, TriangleId::new(PATCH, 4, 4, 0));
-        SkylineSheet::new(&[piece.view()], &ray).is_some()
+/// How open the skylines of all parts are, and that of the patch.
+fn openness(patches: &[Vec<[i32; 3]>]) -> [u32; 2] {
+    let of_part = |number: usize| {
+        let view = view_from(patches, DVec3::Z, SeenFrom::Part { number, lift: 100.0 });
+        view.map_or(0, |view| view.part_skyline().openness())
     };
-    assert!(is_sheet(150.0) && !is_sheet(220.0));
+    let all = (0..16).map(of_part).sum::<u32>() / 16;
+    [all, skyline_of(patches, DVec3::Z).map_or(0, |skyline| skyline.openness())]
+}
+
+#[test]
+fn parts_of_a_patch_that_bends_see_more_than_the_patch() {
+    for (width, least) in [(10.0, 90), (40.0, 85), (60.0, 80), (90.0, 70)] {
+        let [of_parts, of_patch] = openness(&nine(width));
+        assert!(of_parts >= least && of_parts >= of_patch, "{width}: {of_parts}, {of_patch}");
+    }
 }
 
 #[test]
