@@ -539,7 +539,7 @@ impl GridCache {
 
     /// Bytes of what all threads remember of patches that rays leave, for so many patches in all, hidden ones included:
     /// some
-    /// 4.5 MiB at most.
+    /// 6.5 MiB at most.
     pub fn departure_bytes_for(n_patches: usize) -> usize {
         Departures::bytes_for(n_patches)
     }

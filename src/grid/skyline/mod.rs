@@ -13,12 +13,14 @@
 //! for what one goes ahead.
 //!
 //! # What is near
-//! Some patches, the **sheet**: the own one and others that share corners with it. Two sides of them are joined if
-//! their vertices are the same one after the other; those that are not joined to exactly one other are open. Each
-//! triangle of the sheet is seen from n: its normal is turned less than 87 degrees. So the sheet is the graph of a
-//! function locally. Take a rectangle D of x and y that none of the sheet's open sides enters, and around whose middle
-//! they wind once: each point of D has exactly one point of the sheet above it, since a sheet that is the graph of a
-//! function locally has as many there as its border winds (its degree), and that is the same everywhere in D.
+//! Blocks of cells of some patches, the **sheet**: of the own one and of others that share corners with it, those all of
+//! whose triangles are seen from n, their normals turned less than 87 degrees. What is around the blocks of a patch are
+//! lines of edges, run through counter-clockwise. Edges that are run through as often from one end as from the other
+//! cancel: there the surface goes on. The others are open. Take a rectangle D of x and y that no open edge enters, and
+//! around whose middle they wind once: above each point of D, but for those of edges, is exactly one triangle, since all
+//! triangles face n, so that there are as many as their border winds (its degree), and that is the same everywhere in D.
+//! Where two of them meet within D, the edge is the same for both, or it would be open: so the sheet is the graph of a
+//! function over D.
 //!
 //! Let a ray start over D, above the sheet or on it, and meet a point t of the sheet over D. Between, above a straight
 //! line of D, runs a way on the sheet: go along it from where the ray starts, from triangle to triangle; it ends in t,
@@ -27,14 +29,19 @@
 //! the steepest of them, in the steepest direction of the octant, is the elevation of what is near.
 //!
 //! # What is far
-//! All else, and what is near but not inside of D, is put into boxes of x, y and z. From a box around the part to
-//! another the elevation in an octant is the greatest height over the least that one goes ahead, of the differences of
-//! their points that lie in that octant.
+//! All else is put into boxes of x, y and z: what is near but not inside of D, and blocks that turn away. From a box
+//! around the part to another the elevation in an octant is the greatest height over the least that one goes ahead, of
+//! the differences of their points that lie in that octant.
 //!
 //! # Where the ray starts
 //! On a triangle of the part, or above it along the triangle's normal N, as far as the skyline's **lift**, which D and
 //! the part's box allow for. It is above the sheet there if N itself is higher than what is near in N's octant: where
 //! that does not hold, nobody leaves.
+//!
+//! # Parts
+//! A patch that bends sees little along one frame: what rises to one side of it is higher than most of the sky. So a
+//! part from which many rays leave that do not clear the patch's skyline has a [`PartSkyline`], of its four quarters, by
+//! the same argument in a frame of its own and with smaller blocks.
 
 mod measure;
 mod octants;
