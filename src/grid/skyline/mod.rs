@@ -43,8 +43,10 @@
 //! part from which many rays leave that do not clear the patch's skyline has a [`PartSkyline`], of its four quarters, by
 //! the same argument in a frame of its own and with smaller blocks.
 
+mod border;
 mod measure;
 mod octants;
+mod outline;
 mod sheet;
 mod view;
 
