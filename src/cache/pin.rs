@@ -147,10 +147,11 @@ impl<'c> Pin<'c> {
         self.counters.statistics()
     }
 
-    /// Forgets the oldest of the blocks that this thread has built for itself, if there are too many of them, and all of
-    /// them if their slots may be gone. If some of the last visit's found no place because of another pin, that pin's thread is probably asleep
-    /// within its visit, and what it needs is a processor. So this thread steps aside, and does so between two visits,
-    /// with its own pin released: then a thread that does not run holds nothing. It does not wait for anything.
+    /// Forgets the oldest of the blocks that this thread has built for itself, if there are too many of them, and all
+    /// of them if their slots may be gone. If some of the last visit's found no place because of another pin, that
+    /// pin's thread is probably asleep within its visit, and what it needs is a processor. So this thread steps aside,
+    /// and does so between two visits, with its own pin released: then a thread that does not run holds nothing. It
+    /// does not wait for anything.
     #[cold]
     fn look_after_private_blocks(&mut self) {
         let n_tables_gone = self.cache.tag.n_tables_gone();

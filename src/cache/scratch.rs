@@ -76,8 +76,8 @@ impl Scratch {
     /// The block noted for a key since the scratch was last empty, and its lines of child words.
     pub(super) fn recall(&self, key: usize) -> Option<(&[u8], usize)> {
         let Remembered { bytes, word_lines } = *self.remembered.borrow().get(&key)?;
-        // SAFETY: the bytes lie in a chunk, were complete when they were noted, and nobody has them to write; `clear` and
-        // `forget_oldest`, after which alone the lines are given out anew, forget them and need `&mut self`.
+        // SAFETY: the bytes lie in a chunk, were complete when they were noted, and nobody has them to write; `clear`
+        // and `forget_oldest`, after which alone the lines are given out anew, forget them and need `&mut self`.
         Some((unsafe { bytes.as_ref() }, word_lines))
     }
 

@@ -42,14 +42,14 @@ const MOST_PIECES: usize = 256;
 /// at 960x540 took 0.2 % more instructions with 16 than with 8, and as many at 1920x1080 with 4 as with 8.
 const RAYS_PER_PIECE: u32 = 8;
 
-/// Rays that leave a patch whose horizon is known before its skyline is found, and for each of its pieces so many more. To find
-/// it takes some 80 µs for patches of one piece, 135 for four and 310 for sixteen, and spares a ray 30 to 50 ns on
-/// average: about as many rays win that back.
+/// Rays that leave a patch whose horizon is known before its skyline is found, and for each of its pieces so many more.
+/// To find it takes some 80 µs for patches of one piece, 135 for four and 310 for sixteen, and spares a ray 30 to 50 ns
+/// on average: about as many rays win that back.
 const RAYS_BEFORE_SKYLINE: [u32; 2] = [1664, 160];
 
-/// Rays that start in a part of a patch and do not clear the patch's skyline before the part's own is found, and so many
-/// more for each of the patch's pieces. To find it takes 0.8 million instructions for patches of one piece and 1.3 for
-/// four; with 480 and 32, occlusion rays on spot at 16 ran at 0.76 of the speed.
+/// Rays that start in a part of a patch and do not clear the patch's skyline before the part's own is found, and so
+/// many more for each of the patch's pieces. To find it takes 0.8 million instructions for patches of one piece and 1.3
+/// for four; with 480 and 32, occlusion rays on spot at 16 ran at 0.76 of the speed.
 const RAYS_BEFORE_PART: [u32; 2] = [1216, 96];
 
 /// One of so many of them is counted: who counts writes what all threads read.
@@ -219,8 +219,8 @@ impl Departures {
             + MemoTable::<{ PartSkyline::WORDS }>::bytes_for(n_parts)
     }
 
-    /// Whether a ray that starts there is known to meet nothing of the mesh, by the skyline of its patch or of the part.
-    /// `direction` is its direction in the lattice.
+    /// Whether a ray that starts there is known to meet nothing of the mesh, by the skyline of its patch or of the
+    /// part. `direction` is its direction in the lattice.
     #[inline(always)]
     pub fn meets_nothing<K: Kernel>(&self, k: K, start: Option<Start>, direction: K::D, mesh: &WorldMesh) -> bool {
         let Some(Start { number, cell, above, .. }) = start else { return false };
@@ -267,8 +267,8 @@ impl Departures {
         horizon.is_cleared_by(simd::Portable, ray)
     }
 
-    /// Finds the skyline of a patch once enough rays have left it to the side of its horizon, and of one of its parts once
-    /// enough more have not cleared that.
+    /// Finds the skyline of a patch once enough rays have left it to the side of its horizon, and of one of its parts
+    /// once enough more have not cleared that.
     #[cold]
     #[inline(never)]
     #[allow(clippy::too_many_arguments)]

@@ -151,8 +151,8 @@ mod tests {
         }
     }
 
-    /// What was tried: rays, those that were cleared by the skyline of the patch and by that of the part, and those that
-    /// met nothing.
+    /// What was tried: rays, those that were cleared by the skyline of the patch and by that of the part, and those
+    /// that met nothing.
     #[derive(Default, Debug)]
     struct Tally {
         n: usize,

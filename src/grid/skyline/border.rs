@@ -40,8 +40,8 @@ fn partner(sides: &[Side<'_>], side: usize) -> Option<usize> {
     partners.next().filter(|_| partners.next().is_none())
 }
 
-/// Leaves out what is run through as often from one end as from the other, edge by edge: where not all blocks of a patch
-/// are there, its lines are not those of the patches beyond.
+/// Leaves out what is run through as often from one end as from the other, edge by edge: where not all blocks of a
+/// patch are there, its lines are not those of the patches beyond.
 fn open_lines(sides: &[Side<'_>]) -> Vec<Vec<[i32; 3]>> {
     let mut edges: Vec<Edge> = Vec::new();
     for (line, side) in sides.iter().enumerate() {

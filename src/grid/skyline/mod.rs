@@ -13,14 +13,14 @@
 //! for what one goes ahead.
 //!
 //! # What is near
-//! Blocks of cells of some patches, the **sheet**: of the own one and of others that share corners with it, those all of
-//! whose triangles are seen from n, their normals turned less than 87 degrees. What is around the blocks of a patch are
-//! lines of edges, run through counter-clockwise. Edges that are run through as often from one end as from the other
-//! cancel: there the surface goes on. The others are open. Take a rectangle D of x and y that no open edge enters, and
-//! around whose middle they wind once: above each point of D, but for those of edges, is exactly one triangle, since all
-//! triangles face n, so that there are as many as their border winds (its degree), and that is the same everywhere in D.
-//! Where two of them meet within D, the edge is the same for both, or it would be open: so the sheet is the graph of a
-//! function over D.
+//! Blocks of cells of some patches, the **sheet**: of the own one and of others that share corners with it, those all
+//! of whose triangles are seen from n, their normals turned less than 87 degrees. What is around the blocks of a patch
+//! are lines of edges, run through counter-clockwise. Edges that are run through as often from one end as from the
+//! other cancel: there the surface goes on. The others are open. Take a rectangle D of x and y that no open edge
+//! enters, and around whose middle they wind once: above each point of D, but for those of edges, is exactly one
+//! triangle, since all triangles face n, so that there are as many as their border winds (its degree), and that is the
+//! same everywhere in D. Where two of them meet within D, the edge is the same for both, or it would be open: so the
+//! sheet is the graph of a function over D.
 //!
 //! Let a ray start over D, above the sheet or on it, and meet a point t of the sheet over D. Between, above a straight
 //! line of D, runs a way on the sheet: go along it from where the ray starts, from triangle to triangle; it ends in t,
@@ -40,8 +40,8 @@
 //!
 //! # Parts
 //! A patch that bends sees little along one frame: what rises to one side of it is higher than most of the sky. So a
-//! part from which many rays leave that do not clear the patch's skyline has a [`PartSkyline`], of its four quarters, by
-//! the same argument in a frame of its own and with smaller blocks.
+//! part from which many rays leave that do not clear the patch's skyline has a [`PartSkyline`], of its four quarters,
+//! by the same argument in a frame of its own and with smaller blocks.
 
 mod border;
 mod measure;
@@ -178,8 +178,8 @@ impl PartSkyline {
     }
 }
 
-/// Roughly which share of diffuse rays clears such elevations, in percent: those that are higher than an angle above the
-/// horizontal are the square of its cosine of all, whichever octant they are in.
+/// Roughly which share of diffuse rays clears such elevations, in percent: those that are higher than an angle above
+/// the horizontal are the square of its cosine of all, whichever octant they are in.
 fn openness(elevations: &[i8]) -> u32 {
     let above = |elevation: i8| {
         let slope = f32::from(elevation.max(0)) / UNITS / PACKED;

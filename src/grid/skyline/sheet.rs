@@ -44,8 +44,8 @@ pub(super) struct LeftPart {
 pub enum SeenFrom {
     /// Part by part, for all parts of the patch that is left.
     Patch,
-    /// Cell by cell or so, for the quarters of one of its parts, along whose axes all is measured. Rays may start so far
-    /// above it, in lattice steps.
+    /// Cell by cell or so, for the quarters of one of its parts, along whose axes all is measured. Rays may start so
+    /// far above it, in lattice steps.
     Part {
         /// 4 times the one along v and the one along u.
         number: usize,
@@ -105,8 +105,8 @@ impl Frame {
     }
 }
 
-/// Blocks along the sides of patches around a part, of its own and of others, at most. With 8 for its own, occlusion rays
-/// on a cube at 16 run at 0.8 of the speed; with 16 for the others, finding takes 1.7 times as long (spot at 16).
+/// Blocks along the sides of patches around a part, of its own and of others, at most. With 8 for its own, occlusion
+/// rays on a cube at 16 run at 0.8 of the speed; with 16 for the others, finding takes 1.7 times as long (spot at 16).
 const FINE: [usize; 2] = [16, 8];
 
 impl SeenFrom {
