@@ -50,7 +50,7 @@ const RAYS_BEFORE_SKYLINE: [u32; 2] = [1664, 160];
 /// Rays that start in a part of a patch and do not clear the patch's skyline before the part's own is found, and so
 /// many more for each of the patch's pieces. To find it takes 0.8 million instructions for patches of one piece and 1.3
 /// for four; with 480 and 32, occlusion rays on spot at 16 ran at 0.76 of the speed.
-const RAYS_BEFORE_PART: [u32; 2] = [1216, 96];
+const RAYS_BEFORE_PART: [u32; 2] = [1216, 256];
 
 /// One of so many of them is counted: who counts writes what all threads read.
 const RAYS_PER_COUNT: u32 = 32;
