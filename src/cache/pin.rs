@@ -337,3 +337,33 @@ impl<'p> Visit<'p> {
         }
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::super::{BlockLayout, CacheConfig, Claim};
+    use super::*;
+
+    /// Builds a kilobyte for each of these slots, in one visit.
+    fn build(pin: &mut Pin<'_>, table: &SlotTable, slots: std::ops::Range<u32>) {
+        let visit = pin.visit();
+        for slot in slots {
+            let Claim::Build(ticket) = visit.claim(visit.root(table, SlotId(slot))) else { continue };
+            ticket.publish(BlockLayout { bytes: 1024, children: 0 }, |out| out.fill(slot as u8));
+        }
+    }
+
+    #[test]
+    fn a_thread_steps_aside_for_another_pin_and_not_for_its_own() {
+        let cache = SegmentCache::new(CacheConfig { segments: Some(4), ..CacheConfig::with_bytes(16 << 10) }).unwrap();
+        let table = cache.table(200);
+        let mut pin = cache.pin();
+        build(&mut pin, &table, 0..50);
+        assert!(pin.statistics().bypassed_pinned > 0 && !pin.met_a_pin.get(), "its own pin is in the way");
+        (50..100).for_each(|slot| build(&mut pin, &table, slot..slot + 1));
+        assert!(!pin.met_a_pin.get(), "nobody is in the way");
+        let mut other = cache.pin();
+        let _standing = other.visit();
+        (100..150).for_each(|slot| build(&mut pin, &table, slot..slot + 1));
+        assert!(pin.met_a_pin.get(), "another one is in the way");
+    }
+}
