@@ -307,7 +307,7 @@ impl<'p> Visit<'p> {
     /// Notes that a block found no place because of a pin, if it was not this one's alone.
     pub(super) fn note_pinned(&self) {
         let Pin { cache, idx: Some(idx), met_a_pin, .. } = self.pin else { return };
-        if cache.pins.another_before(*idx, cache.ring.oldest_allowing_advance()) {
+        if cache.pins.another_before(*idx, cache.ring.oldest_allowing(cache.ring.head() + 1)) {
             met_a_pin.set(true);
         }
     }

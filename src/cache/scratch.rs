@@ -21,12 +21,6 @@ struct Chunk {
     lines: usize,
 }
 
-impl Chunk {
-    fn holds(&self, address: usize) -> bool {
-        self.memory.holds(address)
-    }
-}
-
 /// Chunks that are filled one after the other.
 #[derive(Default)]
 pub(super) struct Scratch {
@@ -88,8 +82,8 @@ impl Scratch {
             let chunks = self.chunks.get_mut();
             let oldest = chunks.pop_front().expect("the current chunk and those before");
             // A key below a block is an address in it.
-            let is_left = |key: usize, bytes: NonNull<[u8]>| !oldest.holds(key) && !oldest.holds(bytes.addr().get());
-            self.remembered.get_mut().retain(|&key, block| is_left(key, block.bytes));
+            let is_gone = |address: usize| oldest.memory.holds(address);
+            self.remembered.get_mut().retain(|&key, block| !is_gone(key) && !is_gone(block.bytes.addr().get()));
             self.current.set(self.current.get() - 1);
             if oldest.lines == CHUNK_LINES && chunks.len() + 1 < CHUNKS_KEPT {
                 chunks.push_back(oldest);

@@ -127,13 +127,8 @@ impl Ring {
     }
 
     /// The least age of a pin that lets the segment of age `next` become the current one.
-    fn oldest_allowing(&self, next: u64) -> u64 {
+    pub(super) fn oldest_allowing(&self, next: u64) -> u64 {
         next.saturating_sub(self.grace)
-    }
-
-    /// The least age of a pin that lets the head move on.
-    pub(super) fn oldest_allowing_advance(&self) -> u64 {
-        self.oldest_allowing(self.head() + 1)
     }
 
     /// Makes the segment after `age` the current one, unless a pin can still read what is in it. Several threads may do

@@ -2,8 +2,9 @@
 //! own patch would otherwise be what they are tested against most, since they start in the midst of its boxes.
 //!
 //! How high a patch rises above each part of itself, its [`Horizon`], is found from its pieces when enough rays have
-//! left it. When many more have cleared that, its [`Skyline`] is found, which says as much of all that is seen from the
-//! patch: rays that clear that need no walk. Pieces that are not in the cache, and of a skyline's own patch all, are
+//! left it. When many more have left to that side, its [`Skyline`] is found, which says as much of all that is seen from
+//! the patch: rays that clear that need no walk. A part of it from which many rays did not clear it has a
+//! [`PartSkyline`]. Pieces that are not in the cache, and of a skyline's own patch all, are
 //! diced for it and forgotten, so that what is tested does not depend on what the cache holds: a trace of look-ups can
 //! be replayed for any size. Both are remembered as long as no other patch takes their place. They decide only what is
 //! tested, never what is hit.
@@ -28,11 +29,8 @@ const MOST_HORIZONS: usize = 1 << 16;
 /// Patches whose skylines are remembered at most: 2.5 MiB. Four times as many gain nothing more there.
 const MOST_SKYLINES: usize = 1 << 14;
 
-/// Parts of patches whose own skylines are remembered at most: 2 MiB.
+/// Parts of patches whose own skylines are remembered at most: 2 MiB. (Other numbers were not tried.)
 const MOST_PART_SKYLINES: usize = 1 << 15;
-
-/// Parts of a patch.
-const PARTS: u32 = 16;
 
 /// Pieces of a patch whose horizon is found at most. With 64 instead, ambient occlusion of bigguy and monsterfrog at
 /// 1920x1080 and one cell a pixel took 1.14 and 1.09 times as long.
@@ -48,8 +46,9 @@ const RAYS_PER_PIECE: u32 = 8;
 const RAYS_BEFORE_SKYLINE: [u32; 2] = [1664, 160];
 
 /// Rays that start in a part of a patch and do not clear the patch's skyline before the part's own is found, and so
-/// many more for each of the patch's pieces. To find it takes 0.8 million instructions for patches of one piece and 1.3
-/// for four; with 480 and 32, occlusion rays on spot at 16 ran at 0.76 of the speed.
+/// many more for each of the patch's pieces. To find a skyline, on the mean of those of patches and of parts, took 0.8
+/// million instructions on spot at 8, and 1.3 at 16. With 480 and 32, and finer blocks that took 2.1 million, occlusion
+/// rays on spot at 16 ran at 0.76 of the speed.
 const RAYS_BEFORE_PART: [u32; 2] = [1216, 256];
 
 /// One of so many of them is counted: who counts writes what all threads read.
@@ -59,7 +58,7 @@ const RAYS_PER_COUNT: u32 = 32;
 const MOST_PIECES_OF_SKYLINE: usize = 16;
 
 /// If parts see so little more than their patches by their own skylines, on the mean of a mesh so far and in percent of
-/// rays, few more are sought.
+/// rays, few more are sought. (Other shares were not tried.)
 const LEAST_GAIN: u32 = 10;
 
 /// Rays may start so many times as high as the one for which a part's skyline is found, and as many lattice steps more.
@@ -92,7 +91,7 @@ impl Worth {
     }
 
     /// Whether another one is worth while, which takes so many percent.
-    fn is_enough(&self, least: u32) -> bool {
+    fn is_worth_while(&self, least: u32) -> bool {
         let n = self.n.load(Ordering::Relaxed);
         n < FIRST_SKYLINES
             || self.sum.load(Ordering::Relaxed) >= n * u64::from(least)
@@ -293,7 +292,7 @@ impl Departures {
             return;
         }
         let [worth, _] = &self.worth[of.id.idx()];
-        if !may_have_skyline(of, builder) || !worth.is_enough(LEAST_OPENNESS) {
+        if !may_have_skyline(of, builder) || !worth.is_worth_while(LEAST_OPENNESS) {
             return self.skylines.put_off(number);
         }
         builder.departures.skylines += 1;
@@ -328,7 +327,7 @@ impl Departures {
             return;
         }
         let [_, worth] = &self.worth[of.id.idx()];
-        if !may_have_skyline(of, builder) || !worth.is_enough(LEAST_GAIN) {
+        if !may_have_skyline(of, builder) || !worth.is_worth_while(LEAST_GAIN) {
             return self.part_skylines.put_off(number);
         }
         builder.departures.part_skylines += 1;
@@ -349,7 +348,7 @@ impl Departures {
 /// A part's number among those of all patches; where they are too many to be numbered, there are no entries either.
 #[inline(always)]
 fn number_of_part(patch: u32, part: u32) -> u32 {
-    patch.wrapping_mul(PARTS).wrapping_add(part)
+    patch.wrapping_mul(Skyline::N_PARTS).wrapping_add(part)
 }
 
 /// Where there are more patches than entries, none would keep its own if it were easily taken over.
@@ -368,7 +367,7 @@ fn may_have_skyline(of: PatchContext<'_>, builder: &mut Builder<'_>) -> bool {
 
 /// Entries for horizons, for skylines and for those of parts.
 fn entries_for(n_patches: usize) -> [usize; 3] {
-    let (n_numbered, n_parts) = (u32::MAX as usize - 1, PARTS as usize * n_patches);
+    let (n_numbered, n_parts) = (u32::MAX as usize - 1, Skyline::N_PARTS as usize * n_patches);
     [(n_patches, MOST_HORIZONS), (n_patches, MOST_SKYLINES), (n_parts, MOST_PART_SKYLINES)]
         .map(|(n, most)| if n < n_numbered { n.min(most) } else { 0 })
 }
@@ -420,11 +419,11 @@ mod tests {
     fn skylines_that_are_seldom_cleared_are_seldom_sought() {
         let worth = Worth::default();
         (1..FIRST_SKYLINES).for_each(|_| worth.note(LEAST_OPENNESS - 10));
-        assert!(worth.is_enough(LEAST_OPENNESS), "too few to tell");
+        assert!(worth.is_worth_while(LEAST_OPENNESS), "too few to tell");
         worth.note(LEAST_OPENNESS - 10);
-        let tries = (0..10 * PATCHES_PER_TRY).filter(|_| worth.is_enough(LEAST_OPENNESS)).count();
+        let tries = (0..10 * PATCHES_PER_TRY).filter(|_| worth.is_worth_while(LEAST_OPENNESS)).count();
         assert_eq!(tries, 10, "one of sixteen is tried");
         (0..FIRST_SKYLINES).for_each(|_| worth.note(LEAST_OPENNESS + 10));
-        assert!(worth.is_enough(LEAST_OPENNESS), "others found at the same time may be better");
+        assert!(worth.is_worth_while(LEAST_OPENNESS), "others found at the same time may be better");
     }
 }

@@ -45,7 +45,7 @@ pub(super) fn weights(n_ring: usize, apex: usize) -> Option<&'static [[f64; LANE
 /// points go elsewhere.
 fn find(n: usize) -> [Weights; 4] {
     let n_ring = 1 + 2 * n + N_OUTER;
-    let mut out = [0; 4].map(|_| vec![[0.0; LANES]; SIDE * FOURS * n_ring]);
+    let mut out: [Weights; 4] = std::array::from_fn(|_| vec![[0.0; LANES]; SIDE * FOURS * n_ring]);
     for first in (0..n_ring).step_by(4) {
         let unit = |i: usize| Point(std::array::from_fn(|lane| f64::from(u8::from(first + lane == i))));
         let ring: Vec<Point> = (0..n_ring).map(unit).collect();

@@ -80,6 +80,9 @@ pub struct Skyline {
 }
 
 impl Skyline {
+    /// Parts of a patch.
+    pub const N_PARTS: u32 = (PARTS * PARTS) as u32;
+
     /// Words of a skyline.
     pub const WORDS: usize = size_of::<Self>() / size_of::<u64>();
 
@@ -122,9 +125,8 @@ impl Skyline {
         lift: f32,
         word: impl Fn(usize) -> u64,
     ) -> bool {
-        let frame: PackedFrame = bytemuck::cast(word(0));
-        let [u, v] = frame.part(cell.map(u32::from));
-        are_cleared_by(k, frame, word(2 + PARTS * v as usize + u as usize), word(1), direction, lift)
+        let part = Self::part_of(word(0), cell) as usize;
+        are_cleared_by(k, bytemuck::cast(word(0)), word(2 + part), word(1), direction, lift)
     }
 
     /// See [`part`](Self::part), of a skyline whose first word is this.

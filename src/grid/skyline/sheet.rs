@@ -106,7 +106,7 @@ impl Frame {
 }
 
 /// Blocks along the sides of patches around a part, of its own and of others, at most. With 8 for its own, occlusion
-/// rays on a cube at 16 run at 0.8 of the speed; with 16 for the others, finding takes 1.7 times as long (spot at 16).
+/// rays on a cube at 16 run at 0.8 of the speed; with 16 for the others, finding takes 1.6 times as long (spot at 16).
 const FINE: [usize; 2] = [16, 8];
 
 impl SeenFrom {
