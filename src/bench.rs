@@ -9,19 +9,22 @@
 //!
 //! A secondary ray starts `1e-4 diag` above the hit along the geometric normal and is cosine-distributed about it; its
 //! two random numbers are hashes of (pixel, 2 sample) and (pixel, 2 sample + 1). Rays and results are f32, built before
-//! any clock starts. With `batch` above 0, secondary rays are handed over in batches of so many, for the tracer to put
-//! into an order of its own: no part of the recipe. Primary rays are traced one by one as the recipe has it, but the
-//! tracer is told the bounds of a task's rays before the first, within the time that counts, as a renderer would that
-//! knows its tile; with each secondary ray it is told above which triangle that starts, as renderers know as well,
-//! unless `tells_start` is off. Each pass runs K times; rates are million rays per wall second (`median`, `best`) and
-//! per CPU second of the threads (`cpu`).
+//! any clock starts. Where the recipe has rays one by one, the tracer gets what a renderer would tell it, within the time
+//! that counts:
+//! * the bounds of a task's primary rays, and primary rays of 4 x 2 pixels together, unless `one_by_one` is on;
+//! * above which triangle each secondary ray starts, unless `tells_start` is off;
+//! * secondary rays in batches of so many, for the tracer to put into an order of its own, if `batch` is above 0.
+//!
+//! Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of the threads
+//! (`cpu`).
 
 use crate::io::process::thread_cpu;
 use crate::math::{DBounds, Hit, Intersect, PrimitiveRef, Ray, RayBounds};
 use crate::parallel::on_threads;
 use crate::render::sampler::hash2;
+use crate::render::tiles::PixelRect;
 use crate::scene::camera::Camera;
-use glam::{DVec2, Vec3, Vec3A};
+use glam::{DVec2, DVec3, Vec3};
 use parking_lot::Mutex;
 use serde::Serialize;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -29,6 +32,8 @@ use std::time::Instant;
 
 /// Side of a tile of primary rays.
 const TILE: u32 = 16;
+/// Pixels whose primary rays are handed over together: as many as in a packet of the tracer.
+const PACKET_SIZE: [u32; 2] = [4, 2];
 /// Secondary rays in a task.
 const CHUNK: usize = 1024;
 
@@ -39,16 +44,14 @@ struct BenchRay {
     direction: Vec3,
 }
 
-/// The bundle of some rays, in the precision that they have.
-fn bounds_of(rays: &[BenchRay]) -> RayBounds {
-    let (mut low, mut high) = ([Vec3A::INFINITY; 2], [Vec3A::NEG_INFINITY; 2]);
-    for ray in rays {
-        for (k, v) in [ray.origin, ray.direction].into_iter().enumerate() {
-            (low[k], high[k]) = (low[k].min(v.into()), high[k].max(v.into()));
-        }
-    }
-    let [origin, direction] = [0, 1].map(|k| DBounds { min: low[k].as_dvec3(), max: high[k].as_dvec3() });
-    RayBounds { origin, direction }
+/// The bundle of the camera rays of a tile, in the precision that they have.
+fn bundle(camera: &Camera, tile: PixelRect, size: [u32; 2]) -> RayBounds {
+    /// By how much rounding to f32 moves a number up to 1.
+    const ROUNDING: f64 = 1.0 / (1u32 << 25) as f64;
+    let corners = [[tile.x0, tile.y0], [tile.x1, tile.y1]].map(|corner| DVec2::from(corner.map(f64::from)));
+    let exact = camera.bundle(corners, size);
+    let eye = camera.eye().as_vec3().as_dvec3();
+    RayBounds { origin: DBounds { min: eye, max: eye }, direction: exact.direction.expanded(ROUNDING) }
 }
 
 impl BenchRay {
@@ -125,6 +128,8 @@ pub struct BenchSettings {
     pub ao: u32,
     /// Secondary rays handed over at a time; 0: one by one, as the recipe has it.
     pub batch: usize,
+    /// Whether primary rays are handed over one by one, as the recipe has it, and not those of neighbours together.
+    pub one_by_one: bool,
     /// Whether the tracer is told above which triangle each secondary ray starts.
     pub tells_start: bool,
     /// Passes of each measurement.
@@ -178,9 +183,10 @@ impl BenchSettings {
 /// The rays of the recipe and their results.
 pub struct Bench {
     settings: BenchSettings,
+    camera: Camera,
     primary: Vec<BenchRay>,
     pixel: Vec<u32>,
-    tile_start: Vec<usize>,
+    tiles: Vec<PixelRect>,
     hits: Vec<BenchHit>,
 }
 
@@ -197,22 +203,14 @@ pub fn face_parameters(face_size: u32, hit: &Hit) -> [f32; 2] {
 impl Bench {
     /// Makes the primary rays and room for their results.
     pub fn new(camera: &Camera, settings: BenchSettings) -> Self {
-        let [width, height] = settings.size;
+        let tiles = PixelRect::whole(settings.size).blocks([TILE; 2]).collect();
         let mut bench =
-            Self { settings, primary: Vec::new(), pixel: Vec::new(), tile_start: Vec::new(), hits: Vec::new() };
-        for ty in (0..height).step_by(TILE as usize) {
-            for tx in (0..width).step_by(TILE as usize) {
-                bench.tile_start.push(bench.primary.len());
-                for (x, y) in pixels([tx, ty], [width.min(tx + TILE), height.min(ty + TILE)]) {
-                    let center = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-                    let ray = camera.ray(center, settings.size);
-                    let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
-                    bench.primary.push(BenchRay { origin, direction });
-                    bench.pixel.push(y * width + x);
-                }
-            }
+            Self { settings, camera: *camera, primary: Vec::new(), pixel: Vec::new(), tiles, hits: Vec::new() };
+        for [x, y] in bench.tiles.iter().flat_map(|tile| tile.pixels()) {
+            let ray = camera.ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5), settings.size);
+            bench.primary.push(BenchRay { origin: ray.origin.as_vec3(), direction: ray.direction.as_vec3() });
+            bench.pixel.push(y * settings.size[0] + x);
         }
-        bench.tile_start.push(bench.primary.len());
         bench.hits = vec![BenchHit::MISS; bench.primary.len()];
         bench
     }
@@ -252,20 +250,25 @@ impl Bench {
         bench_hit: &(impl Fn(&Hit) -> BenchHit + Sync),
         result: &mut BenchResult,
     ) {
-        let (primary, starts, settings) = (&self.primary, &self.tile_start, self.settings);
-        let mut tiles: Vec<_> = split(&mut self.hits, starts);
+        let (tiles, camera, settings) = (&self.tiles, &self.camera, self.settings);
+        let rays = split(&self.primary, tiles);
+        let mut hits: Vec<_> = split_mut(&mut self.hits, tiles);
         let mut pass = |threads| {
-            parallel(threads, make_tracer, &mut tiles, |tracer, tile, hits| {
-                let rays = &primary[starts[tile]..starts[tile + 1]];
-                tracer.aim(&bounds_of(rays));
-                for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
-                    *hit = tracer.closest(&ray.ray()).map_or(BenchHit::MISS, |h| bench_hit(&h));
+            parallel(threads, make_tracer, &mut hits, |tracer, tile, hits| {
+                let rays = rays[tile];
+                tracer.aim(&bundle(camera, tiles[tile], settings.size));
+                if settings.one_by_one {
+                    for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
+                        *hit = tracer.closest(&ray.ray()).map_or(BenchHit::MISS, |h| bench_hit(&h));
+                    }
+                } else {
+                    trace_in_packets(tracer, tiles[tile], rays, hits, bench_hit);
                 }
             })
         };
         result.first_pass_s = pass(settings.threads).0;
         if settings.passes[0] {
-            result.primary = Some(measure(&settings, primary.len(), &mut pass));
+            result.primary = Some(measure(&settings, self.primary.len(), &mut pass));
         }
         let hits = self.hits.iter().filter(|h| h.t < f32::INFINITY);
         let (n, sum) = hits.fold((0, 0.0), |(n, sum), h| (n + 1, sum + f64::from(h.t)));
@@ -380,19 +383,41 @@ impl Bench {
     }
 }
 
-fn pixels(from: [u32; 2], to: [u32; 2]) -> impl Iterator<Item = (u32, u32)> {
-    (from[1]..to[1]).flat_map(move |y| (from[0]..to[0]).map(move |x| (x, y)))
+/// Traces the primary rays of a tile, those of a few pixels side by side at a time.
+fn trace_in_packets<T: Intersect>(
+    tracer: &mut T,
+    tile: PixelRect,
+    rays: &[BenchRay],
+    hits: &mut [BenchHit],
+    bench_hit: &impl Fn(&Hit) -> BenchHit,
+) {
+    const MOST: usize = (PACKET_SIZE[0] * PACKET_SIZE[1]) as usize;
+    let (mut directions, mut found) = ([DVec3::ZERO; MOST], [None; MOST]);
+    for block in tile.blocks(PACKET_SIZE) {
+        let (width, n) = (block.width() as usize, block.n_pixels());
+        let first = tile.idx([block.x0, block.y0]).expect("a block is in its tile");
+        let places = (first..).step_by(tile.width() as usize);
+        for (row, place) in directions[..n].chunks_exact_mut(width).zip(places.clone()) {
+            row.iter_mut().zip(&rays[place..]).for_each(|(direction, ray)| *direction = ray.direction.as_dvec3());
+        }
+        tracer.closest_from(rays[0].origin.as_dvec3(), &directions[..n], &mut found[..n]);
+        for (row, place) in found[..n].chunks_exact(width).zip(places) {
+            let hits = hits[place..].iter_mut().zip(row);
+            hits.for_each(|(to, hit)| *to = hit.as_ref().map_or(BenchHit::MISS, bench_hit));
+        }
+    }
 }
 
-fn split<'a, T>(mut items: &'a mut [T], starts: &[usize]) -> Vec<&'a mut [T]> {
-    starts
-        .windows(2)
-        .map(|w| {
-            let (part, rest) = std::mem::take(&mut items).split_at_mut(w[1] - w[0]);
-            items = rest;
-            part
-        })
-        .collect()
+/// The items of each tile, where they lie tile after tile.
+fn split<'a, T>(mut items: &'a [T], tiles: &[PixelRect]) -> Vec<&'a [T]> {
+    let of_tile = |tile: &PixelRect| items.split_off(..tile.n_pixels()).expect("an item for each pixel");
+    tiles.iter().map(of_tile).collect()
+}
+
+/// The same to be written.
+fn split_mut<'a, T>(mut items: &'a mut [T], tiles: &[PixelRect]) -> Vec<&'a mut [T]> {
+    let of_tile = |tile: &PixelRect| items.split_off_mut(..tile.n_pixels()).expect("an item for each pixel");
+    tiles.iter().map(of_tile).collect()
 }
 
 fn share(flags: &[bool]) -> f64 {
@@ -508,6 +533,7 @@ mod tests {
             threads: 1,
             ao: 1,
             batch: 0,
+            one_by_one: false,
             tells_start: true,
             repeat: 1,
             passes: [true; 3],

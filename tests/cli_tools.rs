@@ -98,6 +98,19 @@ fn bench_prints_the_keys_of_the_recipe_and_writes_hits() {
 }
 
 #[test]
+fn bench_traces_primary_rays_together_or_one_by_one() {
+    let folder = folder();
+    let [together, alone] = ["", " --one-by-one"].map(|option| {
+        let line =
+            format!("bench cube.obj --rate 9 --size 101x75 --rays primary --repeat 1 --json --hits hits.bin{option}");
+        let told = json(&run(folder.path(), &line).success());
+        (fs::read(folder.path().join("hits.bin")).unwrap(), told["cache"]["lookups"].as_u64().unwrap())
+    });
+    assert!(together.0 == alone.0, "other hits");
+    assert!(4 * together.1 < 3 * alone.1, "{} lookups together, {} one by one", together.1, alone.1);
+}
+
+#[test]
 fn wrong_input_gets_a_sentence() {
     let folder = folder();
     let says = |line: &str, sentence: &str| {

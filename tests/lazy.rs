@@ -130,6 +130,44 @@ fn taking_aim_changes_no_answer() {
 }
 
 #[test]
+fn rays_from_one_point_answer_as_single_rays_do() {
+    let mut random = Random(0x9ac_4e75);
+    let mut n_hits = 0;
+    for (name, mesh) in shapes::all() {
+        let turned = DAffine3::from_rotation_y(0.7) * DAffine3::from_scale(DVec3::new(-1.0, 0.5, 2.0));
+        let places = [DAffine3::IDENTITY, DAffine3::from_translation(DVec3::new(0.5, 1.5, -0.3)) * turned];
+        let rate = [1, 7, 20, 40][random.below(4)];
+        let parts = places.map(|place| (mesh.clone(), place, DicingRate::Fixed(rate)));
+        let world = world_of(parts.into_iter().take(1 + random.below(2)).collect());
+        let ample = cache_of(&world, CacheConfig::with_bytes(16 << 20));
+        let caches = [0, 64 << 10, 16 << 20].map(|bytes| cache_of(&world, CacheConfig::with_bytes(bytes)));
+        let mut one_by_one = Intersector::new(&world, &ample);
+        let mut tracers = caches.each_ref().map(|cache| Intersector::new(&world, cache));
+        let bounds = world.meshes().iter().map(WorldMesh::bounds_in_world).fold(DBounds::EMPTY, DBounds::union);
+        for round in 0..40 {
+            let eye = bounds.center() + 10f64.powi(random.below(4) as i32 - 1) * bounds.diagonal() * random.in_cube();
+            let forward = bounds.center() + 0.4 * bounds.diagonal() * random.in_cube() - eye;
+            let spread = [0.0, 1e-3, 0.03, 1.0][random.below(4)] * forward.length();
+            let n = [1, 3, 8, 21][random.below(4)];
+            let directions: Vec<DVec3> = (0..n).map(|_| forward + spread * random.in_cube()).collect();
+            let rays: Vec<Ray> = directions.iter().map(|&direction| Ray::new(eye, direction)).collect();
+            let wanted: Vec<Option<Hit>> = rays.iter().map(|ray| one_by_one.closest(ray)).collect();
+            n_hits += wanted.iter().flatten().count();
+            for tracer in &mut tracers {
+                // Aimed along these rays, along some of them, or along those of before.
+                if round % 3 < 2 {
+                    tracer.aim(&rays[..n - (n - 1) * (round % 3) / 2].iter().copied().collect());
+                }
+                let mut hits = vec![None; n];
+                tracer.closest_from(eye, &directions, &mut hits);
+                assert_eq!(format!("{hits:?}"), format!("{wanted:?}"), "{name}, from {eye} along {directions:?}");
+            }
+        }
+    }
+    assert!(n_hits > 1000, "only {n_hits} rays hit anything");
+}
+
+#[test]
 fn rays_said_to_start_above_a_surface_answer_as_if_they_were_not() {
     let mut random = Random(0xabc_0de);
     let (mut n_spared, mut n_asked) = (0, 0);

@@ -50,6 +50,9 @@ pub struct BenchArgs {
     /// Ambient occlusion rays at each hit
     #[arg(long, default_value_t = 8, value_name = "N", value_parser = clap::value_parser!(u32).range(..=4096))]
     ao: u32,
+    /// Trace primary rays one by one, as given; else those of 4 x 2 pixels together
+    #[arg(long)]
+    one_by_one: bool,
     /// Hand secondary rays over N at a time, for the tracer to put into an order of its own; 0: one by one, as given
     #[arg(long, default_value_t = 0, value_name = "N")]
     batch: usize,
@@ -97,6 +100,8 @@ struct Report {
     width: u32,
     height: u32,
     eye: [f64; 3],
+    /// Whether primary rays were traced one by one.
+    one_by_one: bool,
     /// Secondary rays handed over at a time; 0: one by one.
     batch: usize,
     /// Whether secondary rays came with the triangle that they start above.
@@ -122,6 +127,7 @@ impl BenchArgs {
             size: self.size,
             threads,
             ao: self.ao,
+            one_by_one: self.one_by_one,
             batch: self.batch,
             tells_start: !self.no_start,
             repeat: self.repeat as usize,
@@ -156,6 +162,7 @@ impl BenchArgs {
             width: self.size[0],
             height: self.size[1],
             eye: description.eye.to_array(),
+            one_by_one: self.one_by_one,
             batch: self.batch,
             tells_start: !self.no_start,
             result,

@@ -43,7 +43,7 @@ pub(super) struct Head {
     /// Things along u and v, 1 to 4 each.
     pub lanes: [u8; 2],
     /// The lanes that are used, as bits: `lane_mask(lanes)`.
-    mask: u16,
+    pub mask: u16,
     pub cells: CellRect,
     /// Cells of the whole patch along u and v.
     pub grid: [u16; 2],
@@ -176,20 +176,20 @@ impl Head {
 
     /// Whether there are lanes from 8 on: a third or fourth row.
     #[inline(always)]
-    fn has_high_lanes(&self) -> bool {
+    pub fn has_high_lanes(&self) -> bool {
         self.mask > 0xff
     }
 
     /// The planes in units of four lanes, from lane 0 or 8 on: plane p of four lanes at index `p as usize`.
     #[inline(always)]
-    fn half_of_planes(&self, half: usize) -> &[[u8; 4]; 22] {
+    pub fn half_of_planes(&self, half: usize) -> &[[u8; 4]; 22] {
         let fours: &[[u8; 4]; 24] = bytemuck::cast_ref(&self.planes);
         fours[2 * half..2 * half + 22].try_into().expect("two units of the last plane")
     }
 
     /// Base and, in the fourth place, exponents.
     #[inline(always)]
-    fn frame(&self) -> &[i32; 4] {
+    pub fn frame(&self) -> &[i32; 4] {
         bytemuck::from_bytes(&bytemuck::bytes_of(self)[..16])
     }
 }
@@ -205,9 +205,9 @@ struct Slabs<K: Kernel> {
 }
 
 /// Picks for [`Kernel::shuffle`]: x, y or z in every lane.
-const ALL_X: i32 = 0b00_00_00_00;
-const ALL_Y: i32 = 0b01_01_01_01;
-const ALL_Z: i32 = 0b10_10_10_10;
+pub(super) const ALL_X: i32 = 0b00_00_00_00;
+pub(super) const ALL_Y: i32 = 0b01_01_01_01;
+pub(super) const ALL_Z: i32 = 0b10_10_10_10;
 
 impl<K: Kernel> Slabs<K> {
     #[inline(always)]

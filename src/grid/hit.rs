@@ -1,7 +1,7 @@
 //! Triangles by number, and what a ray hit.
 
 use crate::ids::PatchId;
-use glam::{DVec3, IVec3, Vec3};
+use glam::{DVec3, Vec3};
 
 /// One triangle of a mesh: patch, cell (i, j) and half, in one word whose order is that of (patch, j, i, half).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -88,10 +88,9 @@ impl LatticeHit {
     /// Exact, slivers included: edges are whole numbers below 2^25, products below 2^50, and f64 holds their
     /// differences.
     #[inline(always)]
-    pub(super) fn normal_of(corners: [IVec3; 3]) -> DVec3 {
-        let [a, b, c] = corners;
-        let (e, f) = ((b - a).as_dvec3(), (c - a).as_dvec3());
-        e.cross(f)
+    pub(super) fn normal_of(corners: [Vec3; 3]) -> DVec3 {
+        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+        (b - a).cross(c - a)
     }
 
     /// Place of the hit in the grid, in cells from corner 0 of the patch: (u n_u, v n_v).

@@ -29,14 +29,15 @@
 //! 4. Every kernel gives the same bits.
 //! 5. Of two hits at equal t the smaller [`TriangleId`] wins, so the order of tests does not matter.
 //!
-//! Read [`ray`](LatticeRay), then `boxes.rs`, `piece.rs`, `triangles.rs`; `horizon/` spares rays the surface that they
-//! leave, `skyline/` all the rest.
+//! Read [`ray`](LatticeRay), then `boxes.rs`, `piece.rs`, `triangles.rs`; `packet/` takes eight camera rays at once,
+//! `horizon/` spares rays the surface that they leave, `skyline/` all the rest.
 
 mod boxes;
 mod frame;
 mod hit;
 mod horizon;
 mod node;
+mod packet;
 mod piece;
 mod ray;
 mod skyline;
@@ -47,6 +48,7 @@ pub use boxes::{CellRect, HEAD_BYTES, LaneHits, lane_mask};
 pub use hit::{LatticeHit, TriangleId};
 pub use horizon::{Borders, Horizon};
 pub use node::{NODE_BYTES, NodeView, encode_node, is_node};
+pub use packet::{PACKET, RayPacket, SeenBoxes};
 use piece::leaves_below;
 pub use piece::{MAX_CELLS, MOST_PIECE_BYTES, PieceLayout, PieceView, VertexFormat};
 pub use ray::{LATTICE_LIMIT, LatticeRay, Plane};

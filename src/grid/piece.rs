@@ -329,7 +329,7 @@ impl<'b> PieceView<'b> {
     }
 
     #[inline(always)]
-    pub(super) fn read<const BYTES: usize>(&self, i: usize, j: usize) -> [i32; 3] {
+    fn read<const BYTES: usize>(&self, i: usize, j: usize) -> [i32; 3] {
         [self.coordinate::<BYTES>(i, j, 0), self.coordinate::<BYTES>(i, j, 1), self.coordinate::<BYTES>(i, j, 2)]
     }
 
@@ -370,6 +370,6 @@ pub(super) fn leaves_below(piece: &PieceView<'_>, ray: &super::LatticeRay) -> bo
     if !(u32::from(i0)..u32::from(i1)).contains(&i) || !(u32::from(j0)..u32::from(j1)).contains(&j) {
         return false;
     }
-    let [a, b, c] = piece.corners(ray.skip).map(|corner| corner.as_dvec3());
+    let [a, b, c] = piece.corners(simd::Portable, ray.skip).map(|corner| corner.as_dvec3());
     (b - a).cross(c - a).dot(ray.direction()) < 0.0
 }

@@ -46,6 +46,12 @@ impl Plane {
     pub fn index(self) -> usize {
         self as usize
     }
+
+    /// Whether it is one of the greatest coordinates.
+    #[inline(always)]
+    pub(super) fn is_high(self) -> bool {
+        self as u8 >= Self::HighX as u8
+    }
 }
 
 /// An axis of lattice space.
@@ -187,8 +193,7 @@ impl LatticeRay {
     pub fn of_lanes<K: Kernel>(k: K, origin: K::D, direction: K::D, t_max: f32, skip: TriangleId) -> Self {
         let magnitude = k.abs4(direction);
         let largest = k.greatest_of_three(magnitude);
-        let least = (largest * (2.0 * DUST)).max(1.0 / GREATEST_ORDINARY);
-        let is_ordinary = k.lt4(k.splat4(least), magnitude)
+        let is_ordinary = k.lt4(k.splat4(least_ordinary(largest)), magnitude)
             & k.lt4(k.abs4(origin), k.splat4(START_LIMIT))
             & k.lt4(k.splat4(largest), k.splat4(GREATEST_ORDINARY))
             & 7
@@ -243,8 +248,7 @@ impl LatticeRay {
     /// finite `t`.
     #[inline]
     pub fn caller_t(&self, t: f32) -> f32 {
-        let t = (f64::from(t) + self.t_start) * self.t_unit;
-        if t.is_finite() { t.min(f64::from(f32::MAX)) as f32 } else { f32::INFINITY }
+        caller_t(t, self.t_start, self.t_unit)
     }
 
     /// The inverse of [`Self::caller_t`], rounded up so that nothing at `t` or before lies beyond it.
@@ -278,6 +282,31 @@ impl LatticeRay {
     pub fn t_max(&self) -> f32 {
         self.t_max
     }
+}
+
+/// [`LatticeRay::caller_t`] of a ray that starts and counts so.
+#[inline(always)]
+pub(super) fn caller_t(t: f32, t_start: f64, t_unit: f64) -> f32 {
+    let t = (f64::from(t) + t_start) * t_unit;
+    if t.is_finite() { t.min(f64::from(f32::MAX)) as f32 } else { f32::INFINITY }
+}
+
+/// Magnitudes of an ordinary direction whose greatest is `largest` are above.
+#[inline(always)]
+fn least_ordinary(largest: f64) -> f64 {
+    (largest * (2.0 * DUST)).max(1.0 / GREATEST_ORDINARY)
+}
+
+/// Whether a direction with these least and greatest magnitudes is made ready without looking at special cases.
+#[inline(always)]
+pub(super) fn is_ordinary_direction(least: f64, largest: f64) -> bool {
+    (least_ordinary(largest) < least) & (largest < GREATEST_ORDINARY)
+}
+
+/// Whether rays start at this point (in lanes 0 to 2), as it is.
+#[inline(always)]
+pub(super) fn is_ordinary_origin<K: Kernel>(k: K, origin: K::D) -> bool {
+    k.lt4(k.abs4(origin), k.splat4(START_LIMIT)) & 7 == 7
 }
 
 /// Where a ray starts and how it counts t.
@@ -327,12 +356,18 @@ impl<D, F> Start<D, F> {
 /// The power of two p with p <= x < 2p, for a positive normal x; the smallest normal number for a subnormal one.
 #[inline(always)]
 fn power_of_two_below(x: f64) -> f64 {
-    f64::from_bits(x.to_bits() & 0x7ff0_0000_0000_0000).max(f64::MIN_POSITIVE)
+    power_of_two_of(x).max(f64::MIN_POSITIVE)
+}
+
+/// The same of a normal number.
+#[inline(always)]
+pub(super) fn power_of_two_of(x: f64) -> f64 {
+    f64::from_bits(x.to_bits() & 0x7ff0_0000_0000_0000)
 }
 
 /// 1 / p for a power of two between 2^-1022 and 2^1021, without dividing.
 #[inline(always)]
-fn reciprocal_of_power(p: f64) -> f64 {
+pub(super) fn reciprocal_of_power(p: f64) -> f64 {
     const TWICE_THE_BIAS: u64 = 2046 << 52;
     f64::from_bits(TWICE_THE_BIAS - p.to_bits())
 }

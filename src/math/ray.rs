@@ -120,6 +120,13 @@ pub trait Intersect {
     /// Announces rays: many of the next ones that [`closest`](Self::closest) is asked about are of this bundle. Answers
     /// do not depend on it.
     fn aim(&mut self, _bundle: &RayBounds) {}
+    /// [`closest`](Self::closest) for each of some rays from one point, without end, that go about the same way: camera
+    /// rays of neighbouring pixels, eight at a time or more. `hits` is as long as `directions`.
+    fn closest_from(&mut self, origin: DVec3, directions: &[DVec3], hits: &mut [Option<Hit>]) {
+        assert_eq!(directions.len(), hits.len());
+        let rays = directions.iter().map(|&direction| Ray::new(origin, direction));
+        rays.zip(hits).for_each(|(ray, hit)| *hit = self.closest(&ray));
+    }
     /// [`closest`](Self::closest) for each of the rays, in whatever order is fast; `hits` is as long as `rays`.
     fn closest_batch(&mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len());

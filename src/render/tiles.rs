@@ -39,6 +39,19 @@ impl PixelRect {
         (self.y0..self.y1).flat_map(move |y| (self.x0..self.x1).map(move |x| [x, y]))
     }
 
+    /// The rectangle cut into smaller ones of `width` x `height` pixels or less, row by row.
+    pub fn blocks(self, [width, height]: [u32; 2]) -> impl Iterator<Item = Self> {
+        let rows = (self.y0..self.y1).step_by(height as usize);
+        rows.flat_map(move |y0| (self.x0..self.x1).step_by(width as usize).map(move |x0| (x0, y0))).map(
+            move |(x0, y0)| Self {
+                x0,
+                y0,
+                x1: self.x1.min(x0.saturating_add(width)),
+                y1: self.y1.min(y0.saturating_add(height)),
+            },
+        )
+    }
+
     /// The pixels that both have; it is empty if there are none.
     pub fn intersection(self, other: Self) -> Self {
         let [x0, y0] = [self.x0.max(other.x0), self.y0.max(other.y0)];
@@ -144,6 +157,18 @@ mod tests {
             tiles.flat_map(|tile| tile.pixels()).for_each(|p| seen[window.idx(p).unwrap()] += 1);
             assert!(seen.iter().all(|&n| n == 1), "{window:?}");
         }
+    }
+
+    #[test]
+    fn blocks_cover_every_pixel_once() {
+        let rect = PixelRect { x0: 5, y0: 3, x1: 18, y1: 8 };
+        let mut seen = vec![0; rect.n_pixels()];
+        for block in rect.blocks([4, 2]) {
+            assert!(block.width() <= 4 && block.height() <= 2 && block.n_pixels() > 0);
+            block.pixels().for_each(|p| seen[rect.idx(p).unwrap()] += 1);
+        }
+        assert!(seen.iter().all(|&n| n == 1));
+        assert_eq!(PixelRect { x1: 5, ..rect }.blocks([4, 2]).count(), 0);
     }
 
     #[test]

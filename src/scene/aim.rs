@@ -11,6 +11,7 @@ use super::world::{World, WorldMesh};
 use crate::ids::MeshId;
 use crate::math::simd::{Kernel, Task};
 use crate::math::{DBounds, Ray, RayBounds};
+use glam::DVec3;
 
 /// Directions of a bundle differ by less than this share of their greatest component, axis by axis: rays that have less
 /// in common are traced from the root.
@@ -42,6 +43,11 @@ impl Aim {
     pub fn may_contain(&self, ray: &Ray) -> bool {
         let DBounds { min, max } = self.bundle.origin;
         min.x <= ray.origin.x && ray.origin.x <= max.x
+    }
+
+    /// Whether rays from this point may be of the bundle.
+    pub fn starts_at(&self, origin: DVec3) -> bool {
+        self.bundle.origin.contains(origin)
     }
 
     /// Whether it is.

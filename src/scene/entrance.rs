@@ -1,5 +1,6 @@
 //! The way of a ray into a mesh's lattice space, and a quick look whether it may come near the mesh at all.
 
+use crate::grid::PACKET;
 use crate::math::simd::Kernel;
 use crate::math::{DBounds, Ray};
 use glam::{DAffine3, DVec3};
@@ -33,6 +34,23 @@ impl Entrance {
         // that.
         let origin = k.add4(turned(k, [x, y, z], ray.origin), k.load4(translation));
         [origin, turned(k, [x, y, z], ray.direction)]
+    }
+
+    /// Directions of rays in lattice space, as [`Self::ray`] has them: x, y and z of each.
+    #[inline(always)]
+    pub fn directions<K: Kernel>(&self, k: K, rays: &[DVec3; PACKET]) -> [[f64; PACKET]; 3] {
+        let [x, y, z, _] = &self.columns;
+        let columns = [k.load4(x), k.load4(y), k.load4(z)];
+        let mut directions = [[0.0; PACKET]; 3];
+        for first in (0..PACKET).step_by(4) {
+            let [a, b] = [turned(k, columns, rays[first]), turned(k, columns, rays[first + 1])];
+            let [c, d] = [turned(k, columns, rays[first + 2]), turned(k, columns, rays[first + 3])];
+            let [x, y, z, _] = k.transpose4([a, b, c, d]);
+            directions[0][first..first + 4].copy_from_slice(&k.store4(x));
+            directions[1][first..first + 4].copy_from_slice(&k.store4(y));
+            directions[2][first..first + 4].copy_from_slice(&k.store4(z));
+        }
+        directions
     }
 
     /// Whether such a ray comes within reach.

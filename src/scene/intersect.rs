@@ -5,17 +5,19 @@
 //! spot, so nothing is tessellated but what a ray reaches.
 //!
 //! `entrance.rs` takes a ray into a mesh's lattice, `aim.rs` and `accel` to its patches, `departure.rs` past the one
-//! that it leaves, `patch_walk.rs` through a patch; `builder.rs` builds what is missing.
+//! that it leaves, `patch_walk.rs` through a patch; `packet.rs` does all of that for eight camera rays at once.
+//! `builder.rs` builds what is missing.
 
 use super::accel::{LeafWalk, TraversalStack};
 use super::aim::{Aim, TakeAim};
 use super::batch::{BatchOrder, MOST_RAYS};
 use super::builder::{Builder, PatchContext};
 use super::departure::Leaving;
+use super::packet::{ClosestOfPacket, PacketScratch};
 use super::patch_walk::{ClosestInPatch, InPatch, OccludedInPatch};
 use super::world::{GridCache, World, WorldMesh};
 use crate::cache::{Pin, SlotId, TraceLog, Visit};
-use crate::grid::{LatticeHit, LatticeRay, TriangleId};
+use crate::grid::{LatticeHit, LatticeRay, PACKET, TriangleId};
 use crate::ids::MeshId;
 use crate::math::simd::{self, Best, Kernel, Task};
 use crate::math::{DBounds, Hit, Intersect, OnTriangle, PrimitiveRef, Ray, RayBounds};
@@ -56,6 +58,7 @@ pub struct Intersector<'w> {
     /// Remembers other patches than the builder's: those that shading asks about.
     shading: Dicer,
     stacks: Stacks,
+    packet: Box<PacketScratch>,
     aim: Aim,
     order: BatchOrder,
     kernel: Best,
@@ -230,7 +233,7 @@ impl Task for OccludedInMesh<'_, '_> {
 
 /// A hit as the caller sees it, at the caller's `t`.
 #[inline(always)]
-fn hit_of(mesh: &WorldMesh, id: MeshId, t: f32, found: &LatticeHit) -> Hit {
+pub(super) fn hit_of(mesh: &WorldMesh, id: MeshId, t: f32, found: &LatticeHit) -> Hit {
     let patch = found.triangle.patch();
     let [u, v] = found.in_cells();
     let [n_u, n_v] = found.grid.map(f32::from);
@@ -264,6 +267,7 @@ impl<'w> Intersector<'w> {
             builder: Builder::noting(cache.trace().map(TraceLog::recorder)),
             shading: Dicer::default(),
             stacks: Stacks::default(),
+            packet: Box::default(),
             aim: Aim::default(),
             order: BatchOrder::new(boxes.fold(DBounds::EMPTY, DBounds::union)),
             kernel: Best::detect(),
@@ -339,6 +343,23 @@ impl<'w> Intersector<'w> {
         })
     }
 
+    /// The nearest hits of at most [`PACKET`] rays from one point together, if that is possible; says whether it is.
+    fn closest_of_packet(&mut self, origin: DVec3, directions: &[DVec3], hits: &mut [Option<Hit>]) -> bool {
+        let mut padded = [directions[0]; PACKET];
+        let directions = directions.first_chunk().unwrap_or_else(|| {
+            padded[..directions.len()].copy_from_slice(directions);
+            &padded
+        });
+        let Self { world, cache, pin, builder, packet, aim, kernel, .. } = self;
+        hits.fill(None);
+        aim.starts_at(origin)
+            && (0..aim.n_meshes()).all(|front| {
+                let (id, front) = aim.front(front);
+                let (mesh, scratch) = ((id, world.mesh(id)), &mut **packet);
+                kernel.run(ClosestOfPacket { mesh, front, cache, pin, builder, scratch, origin, directions, hits })
+            })
+    }
+
     /// Whether anything is hit where there are several meshes.
     #[inline(never)]
     fn occluded_by_meshes(&mut self, ray: &Ray) -> bool {
@@ -366,7 +387,7 @@ impl<'w> Intersector<'w> {
 
 /// The nearer hit of two, of two at the same distance that of the smaller mesh.
 #[inline(always)]
-fn nearer(best: Option<Hit>, found: Option<Hit>) -> Option<Hit> {
+pub(super) fn nearer(best: Option<Hit>, found: Option<Hit>) -> Option<Hit> {
     let (Some(b), Some(hit)) = (best, found) else { return best.or(found) };
     if hit.t < b.t || (hit.t == b.t && hit.primitive.mesh < b.primitive.mesh) { found } else { best }
 }
@@ -409,6 +430,16 @@ impl Intersect for Intersector<'_> {
     fn aim(&mut self, bundle: &RayBounds) {
         let Self { world, aim, kernel, .. } = self;
         kernel.run(TakeAim { aim, world, bundle });
+    }
+
+    fn closest_from(&mut self, origin: DVec3, directions: &[DVec3], hits: &mut [Option<Hit>]) {
+        assert_eq!(directions.len(), hits.len());
+        for (directions, hits) in directions.chunks(PACKET).zip(hits.chunks_mut(PACKET)) {
+            if !self.closest_of_packet(origin, directions, hits) {
+                let rays = directions.iter().map(|&direction| Ray::new(origin, direction));
+                rays.zip(hits).for_each(|(ray, hit)| *hit = self.closest(&ray));
+            }
+        }
     }
 
     fn closest_batch(&mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {

@@ -15,6 +15,7 @@ mod entrance;
 pub mod intersect;
 pub mod light;
 pub mod material;
+mod packet;
 mod patch_walk;
 mod pieces;
 pub mod rate;

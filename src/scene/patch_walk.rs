@@ -48,7 +48,7 @@ impl<'v> InPatch<'_, 'v, '_> {
 }
 
 /// Cells of a node's child.
-fn child_of(node: NodeView<'_>, lane: usize) -> CellRect {
+pub(super) fn child_of(node: NodeView<'_>, lane: usize) -> CellRect {
     let (a, b) = (lane as u32 % NODE_SIDE, lane as u32 / NODE_SIDE);
     child_cells(node.cells(), child_side(node.cells()), a, b)
 }

@@ -3,6 +3,7 @@
 mod boxes;
 mod encoding;
 mod horizon;
+mod packet;
 mod rays;
 mod skyline;
 mod slow;

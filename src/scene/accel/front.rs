@@ -15,7 +15,7 @@
 
 use super::traverse::{TraversalStack, Walk};
 use super::{EMPTY, LANES, LEAF, LeafRef, LeafWalk, NodeBoxes, Refs, TopLevel};
-use crate::grid::LatticeRay;
+use crate::grid::{LatticeRay, PACKET};
 use crate::ids::PatchId;
 use crate::math::simd::{Kernel, place};
 use crate::math::{DBounds, RayBounds};
@@ -44,7 +44,7 @@ const GREATEST_INVERSE: f64 = 1e30;
 pub struct Front {
     /// Least and greatest origin, least and greatest direction, not included; the fourth lane is to spare.
     bounds: [[f64; 4]; 4],
-    groups: Vec<Group>,
+    pub(super) groups: Vec<Group>,
     /// Scratch: what is in the groups, and nodes whose children are still to be looked at.
     items: Vec<Item>,
     open: Vec<Item>,
@@ -56,13 +56,13 @@ const NO_RAY: [[f64; 4]; 4] = [[f64::NAN; 4]; 4];
 /// Eight leaves or nodes, tested like a node's children.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-struct Group {
-    boxes: NodeBoxes,
-    refs: Refs,
+pub(super) struct Group {
+    pub boxes: NodeBoxes,
+    pub refs: Refs,
     /// Leaf slots.
-    slots: [u32; LANES],
+    pub slots: [u32; LANES],
     /// Where the bundle enters the first of them, at least, in units of the rays' own directions.
-    enter: f32,
+    pub enter: f32,
 }
 
 #[derive(Clone, Copy)]
@@ -96,6 +96,21 @@ impl Front {
     #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.groups.is_empty()
+    }
+
+    /// Whether all rays along these directions (x, y and z of each), from an origin that is within the bundle, are of
+    /// it.
+    #[inline(always)]
+    pub fn contains_all<K: Kernel>(&self, k: K, directions: &[[f64; PACKET]; 3]) -> bool {
+        let [.., low, high] = &self.bounds;
+        let mut within = 0xf;
+        for (axis, lanes) in directions.iter().enumerate() {
+            let (four, more) = lanes.split_first_chunk().expect("eight lanes");
+            let (four, more) = (k.load4(four), k.load4(more.first_chunk().expect("eight lanes")));
+            within &= k.lt4(k.splat4(low[axis]), k.min4(four, more));
+            within &= k.lt4(k.max4(four, more), k.splat4(high[axis]));
+        }
+        within == 0xf
     }
 
     /// For another bundle.

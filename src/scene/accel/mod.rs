@@ -21,12 +21,14 @@
 //! 4. No arrangement of boxes makes the tree deep or its build quadratic.
 //!
 //! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs).
-//! Read `traverse.rs` first; `front.rs` lets rays that are much alike begin further down.
+//! Read `traverse.rs` first; `front.rs` lets rays that are much alike begin further down, `packet_walk.rs` takes eight
+//! of them at once.
 
 mod build;
 mod collapse;
 mod front;
 mod groups;
+mod packet_walk;
 mod parts;
 mod traverse;
 mod visit;
@@ -35,6 +37,7 @@ use crate::ids::PatchId;
 
 pub use build::BUILD_BYTES_PER_PATCH;
 pub use front::{Front, FrontWalk};
+pub use packet_walk::PacketWalk;
 pub use traverse::{AnyWalk, TraversalStack, Walk};
 
 /// A leaf of the tree.

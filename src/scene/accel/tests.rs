@@ -1,7 +1,7 @@
 //! The wide tree against a list of boxes.
 
 use super::*;
-use crate::grid::{LatticeRay, TriangleId};
+use crate::grid::{LatticeRay, PACKET, RayPacket, TriangleId};
 use crate::math::simd::{Kernel, Portable, Task, run};
 use crate::math::{Bounds, DBounds, Ray, RayBounds};
 use glam::{DVec3, Vec3};
@@ -358,4 +358,55 @@ fn a_visit_finds_every_patch_but_for_those_in_boxes_that_are_not_entered() {
     found.sort_unstable();
     assert!(found.windows(2).all(|w| w[0] < w[1]) && found.len() < 3000);
     assert!((0..3000).all(|k| !is_left(&boxes[k]) || found.binary_search(&k).is_ok()));
+}
+
+/// The leaves that a packet visits from its bundle's front, with the rays for which it does; `None` if the rays are no
+/// packet.
+struct PacketVisits<'a>(&'a TopLevel, DVec3, &'a [DVec3; PACKET]);
+
+impl Task for PacketVisits<'_> {
+    type Output = Option<Vec<(LeafRef, u32)>>;
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> Self::Output {
+        let Self(tree, eye, directions) = self;
+        let bundle: RayBounds = directions.iter().map(|&direction| Ray::new(eye, direction)).collect();
+        let (mut front, mut packet, mut stack) = (Front::default(), RayPacket::default(), TraversalStack::default());
+        assert!(tree.find_front(kernel, &bundle, &mut front));
+        let along = [0, 1, 2].map(|axis| directions.map(|d| d[axis]));
+        let origin = kernel.load4(&[eye.x, eye.y, eye.z, 0.0]);
+        if !packet.set(kernel, origin, &along, &[f32::INFINITY; PACKET]) {
+            return None;
+        }
+        let is_empty = front.is_empty();
+        let mut walk = (!is_empty).then(|| tree.walk_packet(kernel, &front, &packet, &mut stack));
+        Some(std::iter::from_fn(|| walk.as_mut()?.next(&packet)).collect())
+    }
+}
+
+#[test]
+fn a_packet_visits_every_box_that_one_of_its_rays_meets() {
+    let (mut n_packets, mut n_met, mut n_visits) = (0, 0, 0);
+    for (size, n) in [(10.0, 1), (1e6, 2), (2e5, 3000), (3e6, 400)] {
+        let boxes = scattered(n, size);
+        let tree = TopLevel::build(&boxes, 2);
+        for i in 0..200 {
+            let (eye, target) = (random_point(i, 1.2e7), boxes[(i % n) as usize].center().as_dvec3());
+            let spread = [0.0, 1e5, 1e6][i as usize % 3];
+            let directions = std::array::from_fn(|k| target + random_point(8 * i + k as u64, spread) - eye);
+            let visits = run(PacketVisits(&tree, eye, &directions));
+            assert_eq!(visits, PacketVisits(&tree, eye, &directions).run(Portable), "{n} boxes, packet {i}");
+            let Some(visits) = visits else { continue };
+            n_packets += 1;
+            n_visits += visits.iter().map(|(_, rays)| rays.count_ones()).sum::<u32>();
+            for (k, &direction) in directions.iter().enumerate() {
+                for patch in (0..n as u32).filter(|&p| entry(&boxes[p as usize], eye, direction).is_some()) {
+                    let is_visited = |(leaf, rays): &(LeafRef, u32)| leaf.patch.0 == patch && rays >> k & 1 == 1;
+                    assert!(visits.iter().any(is_visited), "{n} boxes, packet {i}, ray {k}, box {patch}");
+                    n_met += 1;
+                }
+            }
+        }
+    }
+    assert!(n_packets > 400 && n_met > 10_000, "{n_packets} packets met {n_met} boxes");
+    assert!(f64::from(n_visits) < 1.01 * f64::from(n_met), "{n_visits} visits of {n_met} boxes");
 }

@@ -15,10 +15,10 @@ pub struct TraversalStack {
 /// A node that the ray has left for one of its children and will come back to.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(32))]
-struct OpenNode {
+pub(super) struct OpenNode {
     /// Lanes still to be visited, by the places of their entries.
-    order: [u16; LANES],
-    node: u32,
+    pub order: [u16; LANES],
+    pub node: u32,
 }
 
 impl TopLevel {
@@ -92,7 +92,7 @@ impl TopLevel {
 
     /// The nodes, both lists cut to one length, so that one comparison checks both.
     #[inline(always)]
-    fn nodes(&self) -> (&[NodeBoxes], &[Refs]) {
+    pub(super) fn nodes(&self) -> (&[NodeBoxes], &[Refs]) {
         let refs = &self.nodes.refs[..];
         (&self.nodes.boxes[..refs.len()], refs)
     }
@@ -286,6 +286,19 @@ fn spread<K: Kernel>(k: K, x: K::F) -> [K::F; 3] {
 }
 
 impl NodeBoxes {
+    /// How far from an origin one plane of all lanes lies.
+    #[inline(always)]
+    pub(super) fn distance<K: Kernel>(&self, k: K, plane: Plane, origin: f32) -> K::F {
+        k.sub(self.plane(k, plane), k.splat(origin))
+    }
+
+    /// One plane of one lane.
+    #[inline(always)]
+    pub(super) fn coordinate(&self, plane: Plane, lane: usize) -> f32 {
+        let pairs: &[[f32; 2]; 24] = bytemuck::cast_ref(&self.planes);
+        pairs[plane.index() + lane % LANES / 2][lane % 2]
+    }
+
     /// One plane of all lanes.
     #[inline(always)]
     fn plane<K: Kernel>(&self, k: K, plane: Plane) -> K::F {
@@ -298,7 +311,7 @@ impl NodeBoxes {
 impl TraversalStack {
     /// The stack of open nodes, with room for `need`.
     #[inline(always)]
-    fn open_of_size(&mut self, need: usize) -> &mut [OpenNode] {
+    pub(super) fn open_of_size(&mut self, need: usize) -> &mut [OpenNode] {
         if self.open.len() < need {
             self.open.resize(need, OpenNode::default());
         }

@@ -1,0 +1,135 @@
+//! Packets of rays on their way from the front of their bundle to leaves.
+//!
+//! What a packet meets is looked at twice, as in `grid/packet/`: eight boxes for all rays, then those that some ray may
+//! meet for each. Groups of the front come in its order, lanes of nodes below it in the order in which the packet enters
+//! them.
+
+use super::front::Group;
+use super::traverse::{OpenNode, TraversalStack};
+use super::{Front, LANES, LEAF, LeafRef, NodeBoxes, Refs, TopLevel};
+use crate::grid::RayPacket;
+use crate::ids::PatchId;
+use crate::math::simd::Kernel;
+
+impl TopLevel {
+    /// A walk along a packet of rays of the bundle whose front this is, at its start.
+    #[inline(always)]
+    pub fn walk_packet<'t, K: Kernel>(
+        &'t self,
+        kernel: K,
+        front: &'t Front,
+        packet: &RayPacket,
+        stack: &'t mut TraversalStack,
+    ) -> PacketWalk<'t, K> {
+        let (group, rest) = front.groups.split_first().expect("a front that is not empty");
+        let (enter, leave) = group.boxes.seen_by(kernel, packet);
+        let (lanes, order) = (kernel.le(enter, leave), kernel.load_order(&[K::LAST; LANES]));
+        let stack = stack.open_of_size(self.stack_need);
+        PacketWalk { kernel, group, rest, lanes, nodes: self.nodes(), node: 0, order, stack, n: 0 }
+    }
+}
+
+/// The way of a packet of rays along a front, from leaf to leaf.
+pub struct PacketWalk<'t, K: Kernel> {
+    kernel: K,
+    group: &'t Group,
+    rest: &'t [Group],
+    /// Lanes of the group still to be visited.
+    lanes: u32,
+    nodes: (&'t [NodeBoxes], &'t [Refs]),
+    /// Below a node of the front: the present node, and those above that have lanes left.
+    node: u32,
+    order: K::O,
+    stack: &'t mut [OpenNode],
+    n: usize,
+}
+
+impl<'t, K: Kernel> PacketWalk<'t, K> {
+    /// The next patch whose box rays of the packet meet, and which ones, as bits.
+    #[inline(always)]
+    pub fn next(&mut self, packet: &RayPacket) -> Option<(LeafRef, u32)> {
+        let k = self.kernel;
+        loop {
+            if k.has_any(self.order) {
+                let lane = k.first(self.order).0;
+                self.order = k.without(self.order, lane);
+                let rays = self.nodes.0[self.node as usize].meeting(k, packet, lane);
+                if rays == 0 {
+                    continue;
+                }
+                let reference = self.nodes.1[self.node as usize][lane % LANES];
+                if reference & LEAF != 0 {
+                    let slot = self.node * LANES as u32 + lane as u32;
+                    return Some((LeafRef { slot, patch: PatchId(reference & !LEAF) }, rays));
+                }
+                self.stack[self.n] = OpenNode { order: k.store_order(self.order), node: self.node };
+                self.n += usize::from(k.has_any(self.order));
+                self.start_at(packet, reference);
+            } else if self.n != 0 {
+                self.n -= 1;
+                let above = &self.stack[self.n];
+                (self.node, self.order) = (above.node, k.load_order(&above.order));
+            } else if self.lanes != 0 {
+                let lane = self.lanes.trailing_zeros() as usize % LANES;
+                self.lanes &= self.lanes - 1;
+                let rays = self.group.boxes.meeting(k, packet, lane);
+                if rays == 0 {
+                    continue;
+                }
+                let reference = self.group.refs[lane];
+                if reference & LEAF != 0 {
+                    return Some((LeafRef { slot: self.group.slots[lane], patch: PatchId(reference & !LEAF) }, rays));
+                }
+                self.start_at(packet, reference);
+            } else {
+                let (group, rest) = self.rest.split_first()?;
+                if group.enter > packet.farthest() {
+                    return None;
+                }
+                (self.group, self.rest) = (group, rest);
+                self.lanes = {
+                    let (enter, leave) = group.boxes.seen_by(k, packet);
+                    k.le(enter, leave)
+                };
+            }
+        }
+    }
+
+    /// Goes on at a node.
+    #[inline(always)]
+    fn start_at(&mut self, packet: &RayPacket, node: u32) {
+        let (enter, leave) = self.nodes.0[node as usize].seen_by(self.kernel, packet);
+        (self.node, self.order) = (node, self.kernel.in_order(enter, leave));
+    }
+}
+
+impl NodeBoxes {
+    /// Where rays of a packet enter the boxes at least, and where they leave them at most.
+    #[inline(always)]
+    fn seen_by<K: Kernel>(&self, k: K, packet: &RayPacket) -> (K::F, K::F) {
+        let [(near, from_near), (far, from_far)] = packet.sides();
+        let distance = [
+            self.distance(k, near[0], from_near[0]),
+            self.distance(k, near[1], from_near[1]),
+            self.distance(k, near[2], from_near[2]),
+        ];
+        let to_far = [
+            self.distance(k, far[0], from_far[0]),
+            self.distance(k, far[1], from_far[1]),
+            self.distance(k, far[2], from_far[2]),
+        ];
+        packet.range_within(k, distance, to_far)
+    }
+
+    /// The rays of a packet that meet a box, as bits.
+    #[inline(always)]
+    fn meeting<K: Kernel>(&self, k: K, packet: &RayPacket, lane: usize) -> u32 {
+        let [(near, from_near), (far, from_far)] = packet.sides();
+        let [mut distance, mut to_far] = [[0.0; 3]; 2];
+        for axis in 0..3 {
+            distance[axis] = self.coordinate(near[axis], lane) - from_near[axis];
+            to_far[axis] = self.coordinate(far[axis], lane) - from_far[axis];
+        }
+        packet.meeting(k, distance, to_far)
+    }
+}
