@@ -22,7 +22,7 @@ use crate::io::process::thread_cpu;
 use crate::math::{DBounds, Hit, Intersect, PrimitiveRef, Ray, RayBounds};
 use crate::parallel::on_threads;
 use crate::render::sampler::hash2;
-use crate::render::tiles::PixelRect;
+use crate::render::tiles::{PACKET_SIZE, PixelRect};
 use crate::scene::camera::Camera;
 use glam::{DVec2, DVec3, Vec3};
 use parking_lot::Mutex;
@@ -32,8 +32,6 @@ use std::time::Instant;
 
 /// Side of a tile of primary rays.
 const TILE: u32 = 16;
-/// Pixels whose primary rays are handed over together: as many as in a packet of the tracer.
-const PACKET_SIZE: [u32; 2] = [4, 2];
 /// Secondary rays in a task.
 const CHUNK: usize = 1024;
 

@@ -2,7 +2,7 @@
 
 use super::film::Aov;
 use super::tiles::PixelRect;
-use crate::scene::description::{IntegratorKind, Light, Material};
+use crate::scene::description::{DebugView, IntegratorKind, Light, Material};
 use crate::scene::light::sky_radiance;
 use glam::Vec3;
 use std::fmt;
@@ -84,6 +84,12 @@ impl RenderSettings {
             groups: Groups::Off,
             tolerance: 2.0 / 255.0,
         }
+    }
+
+    /// Whether the picture tells what had to be built for each of its pixels.
+    pub(super) fn shows_misses(&self) -> bool {
+        self.integrator == IntegratorKind::Debug(DebugView::Miss)
+            || self.aovs.iter().any(|aov| matches!(aov, Aov::Misses | Aov::Build))
     }
 }
 

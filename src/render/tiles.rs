@@ -1,5 +1,9 @@
 //! Rectangles of pixels and the order in which they are rendered.
 
+/// Columns and rows of pixels whose camera rays are traced together: as many as a packet holds. (A row of eight meets
+/// more patches than they do.)
+pub const PACKET_SIZE: [u32; 2] = [4, 2];
+
 /// A rectangle of pixels of the whole picture: columns `x0..x1`, rows `y0..y1`, row 0 at the top.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct PixelRect {
@@ -35,7 +39,7 @@ impl PixelRect {
     }
 
     /// The pixels, row by row.
-    pub fn pixels(self) -> impl Iterator<Item = [u32; 2]> {
+    pub fn pixels(self) -> impl Iterator<Item = [u32; 2]> + Clone {
         (self.y0..self.y1).flat_map(move |y| (self.x0..self.x1).map(move |x| [x, y]))
     }
 

@@ -7,7 +7,7 @@ use super::rays::RayCounts;
 use super::reason::{PixelCounts, Reason};
 use super::sampler::{Sampler, subpixel};
 use super::settings::{Appearance, Progress, RenderSettings, RunSettings};
-use super::tiles::{PixelRect, TileOrder};
+use super::tiles::{PACKET_SIZE, PixelRect, TileOrder};
 use super::tracer::{Built, Tracer};
 use crate::math::Ray;
 use crate::parallel::on_threads;
@@ -57,11 +57,15 @@ pub fn render<T: Tracer>(
     let counts = on_threads(run.threads, || {
         let mut tracer = make_tracer();
         let mut shader = Shader::new(&mut tracer, appearance, settings);
-        let mut records = Vec::with_capacity((run.tile_side as usize).pow(2).min(settings.window.n_pixels()));
+        let n_pixels = (run.tile_side as usize).pow(2).min(settings.window.n_pixels());
+        let (mut exposures, mut records) = (Vec::with_capacity(n_pixels), Vec::with_capacity(n_pixels));
         while let Some(tile) = queue.next_tile() {
-            records.clear();
+            exposures.clear();
+            exposures.resize(tile.n_pixels(), Exposure::default());
             shader.aim(camera, tile);
-            records.extend(tile.pixels().map(|pixel| pixels.trace(&mut shader, pixel)));
+            pixels.trace_tile(&mut shader, tile, &mut exposures);
+            records.clear();
+            records.extend(exposures.iter().map(Exposure::record));
             film.lock().store(tile, &records);
             queue.report(tile.n_pixels());
         }
@@ -176,13 +180,37 @@ impl PixelTracer<'_> {
         exposure.record()
     }
 
+    /// All samples of the pixels of a tile; `exposures` are as many, row by row.
+    fn trace_tile<T: Tracer>(&self, shader: &mut Shader<'_, T>, tile: PixelRect, exposures: &mut [Exposure]) {
+        if self.settings.shows_misses() {
+            // One by one, so that it is known which pixel a block was built for.
+            for (pixel, exposure) in tile.pixels().zip(exposures) {
+                self.expose(shader, pixel, exposure, self.settings.spp);
+            }
+            return;
+        }
+        for block in tile.blocks(PACKET_SIZE) {
+            let _witness = PanicWitness(block);
+            let mut pixels = block.pixels().cycle();
+            let samples = (0..self.settings.spp).flat_map(|i| block.pixels().map(move |pixel| self.sample(pixel, i)));
+            shader.samples(self.camera, samples, |sample| {
+                let idx = pixels.next().and_then(|pixel| tile.idx(pixel)).expect("a block of the tile has pixels");
+                exposures[idx].add(&sample);
+            });
+        }
+    }
+
     /// Goes on with a pixel's samples until there are `n`.
     pub fn expose<T: Tracer>(&self, shader: &mut Shader<'_, T>, pixel: [u32; 2], exposure: &mut Exposure, n: u32) {
-        let _witness = PanicWitness(pixel);
+        let [x, y] = pixel;
+        let _witness = PanicWitness(PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 });
         let misses_before = shader.misses();
-        for i in exposure.n..n {
-            let (ray, sampler) = self.sample(pixel, i);
+        if exposure.n + 1 == n {
+            let (ray, sampler) = self.sample(pixel, exposure.n);
             exposure.add(&shader.sample(self.camera, ray, sampler));
+        } else if exposure.n < n {
+            let samples = (exposure.n..n).map(|i| self.sample(pixel, i));
+            shader.samples(self.camera, samples, |sample| exposure.add(&sample));
         }
         exposure.misses = exposure.misses + (shader.misses() - misses_before);
     }
@@ -195,14 +223,14 @@ impl PixelTracer<'_> {
     }
 }
 
-/// Says how to come back to the pixel at which a thread panicked.
-pub(super) struct PanicWitness(pub [u32; 2]);
+/// Says how to come back to the pixels at which a thread panicked.
+pub(super) struct PanicWitness(pub PixelRect);
 
 impl Drop for PanicWitness {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            let [x, y] = self.0;
-            eprintln!("this happened at pixel ({x}, {y}): repeat it with --crop {x},{},{y},{}", x + 1, y + 1);
+            let PixelRect { x0, y0, x1, y1 } = self.0;
+            eprintln!("this happened at pixel ({x0}, {y0}) or beside it: repeat it with --crop {x0},{y0},{x1},{y1}");
         }
     }
 }

@@ -435,7 +435,7 @@ impl Intersect for Intersector<'_> {
     fn closest_from(&mut self, origin: DVec3, directions: &[DVec3], hits: &mut [Option<Hit>]) {
         assert_eq!(directions.len(), hits.len());
         for (directions, hits) in directions.chunks(PACKET).zip(hits.chunks_mut(PACKET)) {
-            if !self.closest_of_packet(origin, directions, hits) {
+            if directions.len() == 1 || !self.closest_of_packet(origin, directions, hits) {
                 let rays = directions.iter().map(|&direction| Ray::new(origin, direction));
                 rays.zip(hits).for_each(|(ray, hit)| *hit = self.closest(&ray));
             }

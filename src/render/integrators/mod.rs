@@ -26,10 +26,11 @@ use super::sampler::Sampler;
 use super::settings::{Appearance, RenderSettings};
 use super::tiles::PixelRect;
 use super::tracer::{Built, Tracer};
-use crate::math::Ray;
+use crate::grid::PACKET;
+use crate::math::{Hit, Ray};
 use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use interaction::Interaction;
 use smooth::Trail;
 pub(super) use smooth::{LightMasks, Probe, Smooth, SmoothPoint};
@@ -81,9 +82,49 @@ impl<'a, T: Tracer> Shader<'a, T> {
         self.trace(camera, ray, sampler).0
     }
 
+    /// The same of several rays, one after the other; those of a packet are traced together before that.
+    pub(super) fn samples(
+        &mut self,
+        camera: &Camera,
+        rays: impl IntoIterator<Item = (Ray, Sampler)>,
+        mut take: impl FnMut(Sample),
+    ) {
+        let mut rays = rays.into_iter();
+        let most = if self.settings.shows_misses() { 1 } else { PACKET };
+        loop {
+            let (mut packet, mut directions, mut hits) = ([None; PACKET], [DVec3::ZERO; PACKET], [None; PACKET]);
+            let mut n = 0;
+            for (ray, sampler) in rays.by_ref().take(most) {
+                (packet[n], directions[n]) = (Some((ray, sampler)), ray.direction);
+                n += 1;
+            }
+            if n == 0 {
+                return;
+            }
+            let misses_before = self.misses();
+            self.tracer.closest_from(camera.eye(), &directions[..n], &mut hits[..n]);
+            for ((ray, sampler), hit) in packet.iter().flatten().zip(hits) {
+                take(self.shade(camera, ray, hit, *sampler, misses_before).0);
+            }
+        }
+    }
+
     fn trace(&mut self, camera: &Camera, ray: Ray, sampler: Sampler) -> (Sample, Option<Interaction<'a>>) {
         let misses_before = self.misses();
-        let hit = self.closest(RayKind::Primary, &ray);
+        let hit = self.tracer.closest(&ray);
+        self.shade(camera, &ray, hit, sampler, misses_before)
+    }
+
+    /// Gathers light along a camera ray, of which it is known what it hits.
+    fn shade(
+        &mut self,
+        camera: &Camera,
+        ray: &Ray,
+        hit: Option<Hit>,
+        sampler: Sampler,
+        misses_before: Built,
+    ) -> (Sample, Option<Interaction<'a>>) {
+        let hit = self.interaction(RayKind::Primary, ray, hit);
         let radiance = match (&hit, self.settings.integrator) {
             (None, _) => self.appearance.background,
             (Some(x), IntegratorKind::Whitted) => self.whitted(x),
@@ -95,8 +136,13 @@ impl<'a, T: Tracer> Shader<'a, T> {
     }
 
     fn closest(&mut self, kind: RayKind, ray: &Ray) -> Option<Interaction<'a>> {
-        self.rays.count(kind);
         let hit = self.tracer.closest(ray);
+        self.interaction(kind, ray, hit)
+    }
+
+    /// Takes note of a ray that was traced and makes its hit ready for shading.
+    fn interaction(&mut self, kind: RayKind, ray: &Ray, hit: Option<Hit>) -> Option<Interaction<'a>> {
+        self.rays.count(kind);
         self.trail.note_hit(hit.as_ref());
         let hit = hit?;
         let point = self.tracer.surface_point(ray, &hit);
