@@ -176,16 +176,27 @@ impl BenchSettings {
     fn task_size(&self) -> usize {
         if self.batch > 0 { self.batch } else { CHUNK }
     }
+
+    /// Columns and rows of pixels whose primary rays come after one another.
+    fn block_size(&self) -> [u32; 2] {
+        if self.one_by_one { [TILE; 2] } else { PACKET_SIZE }
+    }
 }
 
 /// The rays of the recipe and their results.
 pub struct Bench {
     settings: BenchSettings,
     camera: Camera,
-    primary: Vec<BenchRay>,
-    pixel: Vec<u32>,
     tiles: Vec<PixelRect>,
+    eye: DVec3,
+    /// Directions of primary rays as they are traced: tile by tile, block by block.
+    primary: Vec<DVec3>,
+    /// What they hit.
     hits: Vec<BenchHit>,
+    /// Their pixels.
+    pixel: Vec<u32>,
+    /// Where among these the rays are in the order of the recipe.
+    order: Vec<usize>,
 }
 
 /// Face parameters as one number each for faces of any size: a quad's are its own; sub-quad i of a polygon has
@@ -201,15 +212,28 @@ pub fn face_parameters(face_size: u32, hit: &Hit) -> [f32; 2] {
 impl Bench {
     /// Makes the primary rays and room for their results.
     pub fn new(camera: &Camera, settings: BenchSettings) -> Self {
-        let tiles = PixelRect::whole(settings.size).blocks([TILE; 2]).collect();
-        let mut bench =
-            Self { settings, camera: *camera, primary: Vec::new(), pixel: Vec::new(), tiles, hits: Vec::new() };
-        for [x, y] in bench.tiles.iter().flat_map(|tile| tile.pixels()) {
-            let ray = camera.ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5), settings.size);
-            bench.primary.push(BenchRay { origin: ray.origin.as_vec3(), direction: ray.direction.as_vec3() });
-            bench.pixel.push(y * settings.size[0] + x);
+        let n = PixelRect::whole(settings.size).n_pixels();
+        let mut bench = Self {
+            settings,
+            camera: *camera,
+            tiles: PixelRect::whole(settings.size).blocks([TILE; 2]).collect(),
+            eye: camera.eye().as_vec3().as_dvec3(),
+            primary: Vec::with_capacity(n),
+            hits: vec![BenchHit::MISS; n],
+            pixel: Vec::with_capacity(n),
+            order: Vec::with_capacity(n),
+        };
+        for tile in &bench.tiles {
+            let first = bench.order.len();
+            bench.order.resize(first + tile.n_pixels(), 0);
+            for pixel in tile.blocks(settings.block_size()).flat_map(PixelRect::pixels) {
+                let [x, y] = pixel;
+                let ray = camera.ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5), settings.size);
+                bench.order[first + tile.idx(pixel).expect("a block is in its tile")] = bench.primary.len();
+                bench.primary.push(ray.direction.as_vec3().as_dvec3());
+                bench.pixel.push(y * settings.size[0] + x);
+            }
         }
-        bench.hits = vec![BenchHit::MISS; bench.primary.len()];
         bench
     }
 
@@ -220,6 +244,7 @@ impl Bench {
         bench_hit: impl Fn(&Hit) -> BenchHit + Sync,
     ) -> BenchResult {
         let mut result = BenchResult::default();
+        let bench_hit = |hit: Option<&Hit>| hit.map_or(BenchHit::MISS, &bench_hit);
         self.run_primary(&make_tracer, &bench_hit, &mut result);
         if !self.settings.passes[1] && !self.settings.passes[2] {
             return result;
@@ -245,30 +270,29 @@ impl Bench {
     fn run_primary<T: Intersect>(
         &mut self,
         make_tracer: &(impl Fn() -> T + Sync),
-        bench_hit: &(impl Fn(&Hit) -> BenchHit + Sync),
+        bench_hit: &(impl Fn(Option<&Hit>) -> BenchHit + Sync),
         result: &mut BenchResult,
     ) {
-        let (tiles, camera, settings) = (&self.tiles, &self.camera, self.settings);
-        let rays = split(&self.primary, tiles);
+        let (tiles, camera, eye, settings) = (&self.tiles, &self.camera, self.eye, &self.settings);
+        let directions = split(&self.primary, tiles);
         let mut hits: Vec<_> = split_mut(&mut self.hits, tiles);
         let mut pass = |threads| {
             parallel(threads, make_tracer, &mut hits, |tracer, tile, hits| {
-                let rays = rays[tile];
                 tracer.aim(&bundle(camera, tiles[tile], settings.size));
                 if settings.one_by_one {
-                    for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
-                        *hit = tracer.closest(&ray.ray()).map_or(BenchHit::MISS, |h| bench_hit(&h));
+                    for (&direction, hit) in directions[tile].iter().zip(hits.iter_mut()) {
+                        *hit = bench_hit(tracer.closest(&Ray::new(eye, direction)).as_ref());
                     }
                 } else {
-                    trace_in_packets(tracer, tiles[tile], rays, hits, bench_hit);
+                    trace_in_packets(tracer, eye, tiles[tile], directions[tile], hits, bench_hit);
                 }
             })
         };
         result.first_pass_s = pass(settings.threads).0;
         if settings.passes[0] {
-            result.primary = Some(measure(&settings, self.primary.len(), &mut pass));
+            result.primary = Some(measure(settings, self.primary.len(), &mut pass));
         }
-        let hits = self.hits.iter().filter(|h| h.t < f32::INFINITY);
+        let hits = self.order.iter().map(|&place| &self.hits[place]).filter(|h| h.t < f32::INFINITY);
         let (n, sum) = hits.fold((0, 0.0), |(n, sum), h| (n + 1, sum + f64::from(h.t)));
         result.hits = n;
         result.mean_t = if n > 0 { sum / n as f64 } else { 0.0 };
@@ -347,15 +371,18 @@ impl Bench {
         let n_ao = if self.settings.passes[1] { self.settings.ao } else { 0 };
         let offset = (1e-4 * self.settings.diagonal) as f32;
         let (mut ao, mut diffuse) = (Vec::new(), Vec::new());
-        for ((ray, hit), &pixel) in self.primary.iter().zip(&self.hits).zip(&self.pixel) {
+        for &place in &self.order {
+            let (hit, pixel) = (&self.hits[place], self.pixel[place]);
             if hit.t == f32::INFINITY {
                 continue;
             }
+            let ray = Ray::new(self.eye, self.primary[place]);
+            let (start, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
             let length = hit.normal.length();
-            let sign = if hit.normal.dot(ray.direction) > 0.0 { -1.0 } else { 1.0 };
+            let sign = if hit.normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
             let normal = hit.normal * (sign / length);
-            let origin = ray.origin + hit.t * ray.direction + offset * normal;
-            let from = self.settings.tells_start.then(|| tracer.closest(&ray.ray())).flatten().map(|hit| hit.primitive);
+            let origin = start + hit.t * direction + offset * normal;
+            let from = self.settings.tells_start.then(|| tracer.closest(&ray)).flatten().map(|hit| hit.primitive);
             let along = |sample: u32| {
                 let direction = cosine_direction(normal, uniform(pixel, 2 * sample), uniform(pixel, 2 * sample + 1));
                 // A little more, for the roundings of the origin.
@@ -384,25 +411,19 @@ impl Bench {
 /// Traces the primary rays of a tile, those of a few pixels side by side at a time.
 fn trace_in_packets<T: Intersect>(
     tracer: &mut T,
+    eye: DVec3,
     tile: PixelRect,
-    rays: &[BenchRay],
-    hits: &mut [BenchHit],
-    bench_hit: &impl Fn(&Hit) -> BenchHit,
+    mut directions: &[DVec3],
+    mut hits: &mut [BenchHit],
+    bench_hit: &impl Fn(Option<&Hit>) -> BenchHit,
 ) {
-    const MOST: usize = (PACKET_SIZE[0] * PACKET_SIZE[1]) as usize;
-    let (mut directions, mut found) = ([DVec3::ZERO; MOST], [None; MOST]);
+    let mut found = [None; (PACKET_SIZE[0] * PACKET_SIZE[1]) as usize];
     for block in tile.blocks(PACKET_SIZE) {
-        let (width, n) = (block.width() as usize, block.n_pixels());
-        let first = tile.idx([block.x0, block.y0]).expect("a block is in its tile");
-        let places = (first..).step_by(tile.width() as usize);
-        for (row, place) in directions[..n].chunks_exact_mut(width).zip(places.clone()) {
-            row.iter_mut().zip(&rays[place..]).for_each(|(direction, ray)| *direction = ray.direction.as_dvec3());
-        }
-        tracer.closest_from(rays[0].origin.as_dvec3(), &directions[..n], &mut found[..n]);
-        for (row, place) in found[..n].chunks_exact(width).zip(places) {
-            let hits = hits[place..].iter_mut().zip(row);
-            hits.for_each(|(to, hit)| *to = hit.as_ref().map_or(BenchHit::MISS, bench_hit));
-        }
+        let n = block.n_pixels();
+        let of_block = directions.split_off(..n).expect("a ray for each pixel");
+        let to = hits.split_off_mut(..n).expect("a hit for each pixel");
+        tracer.closest_from(eye, of_block, &mut found[..n]);
+        to.iter_mut().zip(&found).for_each(|(to, hit)| *to = bench_hit(hit.as_ref()));
     }
 }
 

@@ -345,11 +345,14 @@ impl<'w> Intersector<'w> {
 
     /// The nearest hits of at most [`PACKET`] rays from one point together, if that is possible; says whether it is.
     fn closest_of_packet(&mut self, origin: DVec3, directions: &[DVec3], hits: &mut [Option<Hit>]) -> bool {
-        let mut padded = [directions[0]; PACKET];
-        let directions = directions.first_chunk().unwrap_or_else(|| {
-            padded[..directions.len()].copy_from_slice(directions);
-            &padded
-        });
+        let padded;
+        let directions = match directions.first_chunk() {
+            Some(directions) => directions,
+            None => {
+                padded = padded_with_first(directions);
+                &padded
+            }
+        };
         let Self { world, cache, pin, builder, packet, aim, kernel, .. } = self;
         hits.fill(None);
         aim.starts_at(origin)
@@ -383,6 +386,14 @@ impl<'w> Intersector<'w> {
         in_scene.t_max = in_scene.not_below(ray.t_max);
         in_scene
     }
+}
+
+/// Less than a packet of directions, the first one in the places that are left.
+#[cold]
+fn padded_with_first(directions: &[DVec3]) -> [DVec3; PACKET] {
+    let mut padded = [directions[0]; PACKET];
+    padded[..directions.len()].copy_from_slice(directions);
+    padded
 }
 
 /// The nearer hit of two, of two at the same distance that of the smaller mesh.
