@@ -7,8 +7,9 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use glam::{DAffine3, DVec2, DVec3};
 use lazytess::cache::CacheConfig;
-use lazytess::math::{Intersect, Ray};
+use lazytess::math::Intersect;
 use lazytess::mesh::{ControlMesh, shapes};
+use lazytess::render::tiles::{PACKET_SIZE, PixelRect};
 use lazytess::scene::camera::Camera;
 use lazytess::scene::description::CameraDescription;
 use lazytess::scene::intersect::Intersector;
@@ -31,29 +32,59 @@ fn world() -> World {
     World::new(vec![WorldMesh::new(knight(), DAffine3::IDENTITY, DicingRate::Fixed(16), 1).expect("a sound mesh")])
 }
 
-/// Rays through the pixels, tile by tile.
-fn rays(world: &World) -> Vec<Ray> {
+/// A frame of camera rays, as a renderer hands them over: tile by tile, those of a few pixels together.
+struct Frame {
+    camera: Camera,
+    tiles: Vec<Tile>,
+}
+
+struct Tile {
+    rect: PixelRect,
+    /// Block by block.
+    directions: Vec<DVec3>,
+}
+
+fn frame(world: &World) -> Frame {
     let bounds = world.meshes()[0].bounds_in_world();
     let eye = bounds.center() + 1.35 * (bounds.max - bounds.min).length() * DVec3::new(1.0, 0.6, 1.2).normalize();
     let camera = Camera::new(&CameraDescription { eye, at: bounds.center(), up: DVec3::Y, fov: 35.0 });
-    let tiles = (0..SIZE[1] / TILE).flat_map(|y| (0..SIZE[0] / TILE).map(move |x| [x * TILE, y * TILE]));
-    let pixels = tiles.flat_map(|[x, y]| (0..TILE * TILE).map(move |k| [x + k % TILE, y + k / TILE]));
-    pixels.map(|[x, y]| camera.ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5), SIZE)).collect()
+    let direction = |[x, y]: [u32; 2]| camera.ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5), SIZE).direction;
+    let tile = |rect: PixelRect| {
+        let directions = rect.blocks(PACKET_SIZE).flat_map(PixelRect::pixels).map(direction).collect();
+        Tile { rect, directions }
+    };
+    Frame { tiles: PixelRect::whole(SIZE).blocks([TILE; 2]).map(tile).collect(), camera }
+}
+
+impl Frame {
+    fn n_rays(&self) -> ItemsCount {
+        ItemsCount::new(PixelRect::whole(SIZE).n_pixels())
+    }
 }
 
 fn cache(world: &World, config: CacheConfig) -> GridCache {
     GridCache::new(world, config).expect("the memory is there")
 }
 
-fn trace(world: &World, cache: &GridCache, rays: &[Ray]) -> usize {
+fn trace(world: &World, cache: &GridCache, frame: &Frame) -> usize {
+    const PACKET: usize = (PACKET_SIZE[0] * PACKET_SIZE[1]) as usize;
     let mut tracer = Intersector::new(world, cache);
-    rays.iter().filter(|ray| black_box(tracer.closest(ray)).is_some()).count()
+    let (mut hits, mut n_hits) = ([None; PACKET], 0);
+    for Tile { rect, directions } in &frame.tiles {
+        let corners = [[rect.x0, rect.y0], [rect.x1, rect.y1]].map(|corner| DVec2::from(corner.map(f64::from)));
+        tracer.aim(&frame.camera.bundle(corners, SIZE));
+        for directions in directions.chunks_exact(PACKET) {
+            tracer.closest_from(frame.camera.eye(), directions, &mut hits);
+            n_hits += black_box(&hits).iter().flatten().count();
+        }
+    }
+    n_hits
 }
 
 /// Bytes that the frame's blocks take.
-fn touched(world: &World, rays: &[Ray]) -> usize {
+fn touched(world: &World, frame: &Frame) -> usize {
     let cache = cache(world, CacheConfig::with_bytes(256 << 20));
-    trace(world, &cache, rays);
+    trace(world, &cache, frame);
     cache.segments().statistics().bytes_built as usize
 }
 
@@ -61,44 +92,43 @@ fn touched(world: &World, rays: &[Ray]) -> usize {
 #[divan::bench]
 fn cold(bencher: Bencher) {
     let world = world();
-    let rays = rays(&world);
+    let frame = frame(&world);
     bencher
-        .counter(ItemsCount::new(rays.len()))
+        .counter(frame.n_rays())
         .with_inputs(|| cache(&world, CacheConfig::with_bytes(64 << 20)))
-        .bench_refs(|cache| trace(&world, cache, &rays));
+        .bench_refs(|cache| trace(&world, cache, &frame));
 }
 
 /// As [`cold`], but every block of every patch is built before the first ray.
 #[divan::bench]
 fn tessellated_before(bencher: Bencher) {
     let world = world();
-    let rays = rays(&world);
-    bencher
-        .counter(ItemsCount::new(rays.len()))
-        .with_inputs(|| cache(&world, CacheConfig::with_bytes(64 << 20)))
-        .bench_refs(|cache| {
+    let frame = frame(&world);
+    bencher.counter(frame.n_rays()).with_inputs(|| cache(&world, CacheConfig::with_bytes(64 << 20))).bench_refs(
+        |cache| {
             Intersector::new(&world, cache).tessellate_everything();
-            trace(&world, cache, &rays)
-        });
+            trace(&world, cache, &frame)
+        },
+    );
 }
 
 /// Nothing is built.
 #[divan::bench]
 fn warm(bencher: Bencher) {
     let world = world();
-    let rays = rays(&world);
+    let frame = frame(&world);
     let cache = cache(&world, CacheConfig::with_bytes(64 << 20));
-    trace(&world, &cache, &rays);
-    bencher.counter(ItemsCount::new(rays.len())).bench_local(|| trace(&world, &cache, &rays));
+    trace(&world, &cache, &frame);
+    bencher.counter(frame.n_rays()).bench_local(|| trace(&world, &cache, &frame));
 }
 
 /// The cache has one part in so many of the bytes that the frame touches; 0 is no cache.
 #[divan::bench(args = [8, 100, 0])]
 fn small_cache(bencher: Bencher, part: usize) {
     let world = world();
-    let rays = rays(&world);
-    let bytes = touched(&world, &rays).checked_div(part).unwrap_or(0);
+    let frame = frame(&world);
+    let bytes = touched(&world, &frame).checked_div(part).unwrap_or(0);
     let cache = cache(&world, CacheConfig::with_bytes(bytes));
-    trace(&world, &cache, &rays);
-    bencher.counter(ItemsCount::new(rays.len())).bench_local(|| trace(&world, &cache, &rays));
+    trace(&world, &cache, &frame);
+    bencher.counter(frame.n_rays()).bench_local(|| trace(&world, &cache, &frame));
 }

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use glam::DVec3;
-use lazytess::grid::{CellRect, LatticeHit, LatticeRay, PieceLayout, PieceView, TriangleId};
+use lazytess::grid::{CellRect, LatticeHit, LatticeRay, PACKET, PieceLayout, PieceView, RayPacket, TriangleId};
 use lazytess::ids::PatchId;
 use lazytess::math::LatticeGrid;
 use lazytess::math::simd::{Kernel, Portable, Task, run};
@@ -62,6 +62,26 @@ impl Task for Closest<'_> {
     }
 }
 
+/// Traces packets of rays from one point and counts the hits.
+struct ClosestOfPackets<'a>(PieceView<'a>, DVec3, &'a [[[f64; PACKET]; 3]]);
+
+impl Task for ClosestOfPackets<'_> {
+    type Output = usize;
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> usize {
+        let Self(piece, eye, packets) = self;
+        let (mut packet, mut n_hits) = (RayPacket::default(), 0);
+        for directions in packets {
+            let is_packet =
+                packet.set(kernel, kernel.load4(&[eye.x, eye.y, eye.z, 0.0]), directions, &[f32::MAX; PACKET]);
+            assert!(is_packet, "rays that go about the same way");
+            piece.closest_of_packet(kernel, &mut packet, 0xff, PatchId(0));
+            n_hits += (0..PACKET).filter(|&ray| packet.hit(ray).is_some()).count();
+        }
+        n_hits
+    }
+}
+
 /// Counts the occluded rays.
 struct Occluded<'a>(PieceView<'a>, &'a [LatticeRay]);
 
@@ -85,6 +105,22 @@ fn closest(bencher: Bencher, width: f64) {
     let (block, rays) = (piece(&vertices(width)), rays(width));
     let view = PieceView::new(bytemuck::cast_slice(&block));
     bencher.counter(ItemsCount::new(rays.len())).bench(|| run(Closest(view, black_box(&rays))));
+}
+
+/// Rays from one point to 32 x 32 places of a quarter of the piece, those of 4 x 2 places together; making them ready counts.
+#[divan::bench(args = WIDTHS)]
+fn closest_of_packets(bencher: Bencher, width: f64) {
+    let block = piece(&vertices(width));
+    let view = PieceView::new(bytemuck::cast_slice(&block));
+    let eye = DVec3::new(0.4, 0.3, 1.5) * width;
+    let direction = |x: usize, y: usize| DVec3::new(x as f64 / 64.0, y as f64 / 64.0, 0.1) * width - eye;
+    let directions = |p: usize| {
+        let places = std::array::from_fn(|k| direction(32 + p % 8 * 4 + k % 4, 32 + p / 8 * 2 + k / 4));
+        [0, 1, 2].map(|axis| places.map(|d: DVec3| d[axis]))
+    };
+    let packets: Vec<[[f64; PACKET]; 3]> = (0..128).map(directions).collect();
+    let rays = ItemsCount::new(packets.len() * PACKET);
+    bencher.counter(rays).bench(|| run(ClosestOfPackets(view, eye, black_box(&packets))));
 }
 
 #[divan::bench(args = WIDTHS)]

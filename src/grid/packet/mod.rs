@@ -21,6 +21,9 @@
 //! For any `inv` between the least and the greatest one, of one sign, fl(d * inv) lies between their products, because
 //! rounding keeps the order: so if one ray meets a box, all together may.
 //!
+//! *But for* triangles that have no area: where a ray meets one is not known well, and the boxes beyond are left out.
+//! Which of several is hit depends on the order of visits, alone as in a packet.
+//!
 //! Wald, Slusallek, Benthin, Wagner, "Interactive Rendering with Coherent Ray Tracing", 2001; Boulos, Wald, Shirley,
 //! "Geometric and arithmetic culling methods for entire ray packets", 2006.
 
