@@ -33,14 +33,14 @@ use super::between_probes::{Errors, Interpolation};
 use super::canvas::{Canvas, Surprises, look};
 use super::cells::{CELL_SIDES, Cell, CellPlace, TILE_SIDE, Tile, TracedProbe};
 use super::film::{FirstHit, PixelRecord};
-use super::follow::{Origin, Shown, beside_traced, display_difference, follow, is_surprised};
+use super::follow::{Origin, beside_traced, display_difference, follow, is_surprised};
 use super::footprint::{Claim, Footprints, Scenery};
 use super::integrators::{LightMasks, Probe, Sample, Shader, Smooth};
 use super::rays::RayCounts;
 use super::reason::{PixelCounts, Reason};
 use super::settings::{Appearance, RenderSettings, RunSettings};
 use super::tiles::PixelRect;
-use super::tracer::Tracer;
+use super::tracer::{Built, Tracer};
 use super::workers::{Exposure, GroupSeconds, Rendered, TileQueue, render};
 use crate::ids::{MeshId, PatchId};
 use crate::parallel::on_threads;
@@ -83,7 +83,8 @@ pub fn render_adaptive<T: Tracer>(
             let shader = Shader::new(&mut tracer, appearance, settings);
             let footprints = Footprints::new(&scenery);
             let tile = Tile::new(settings.size);
-            let mut worker = Worker { job: &job, footprints, shader, tile, outcome: Outcome::default() };
+            let mut worker =
+                Worker { job: &job, footprints, shader, tile, probed: Vec::new(), outcome: Outcome::default() };
             work(&mut worker);
             Outcome { rays: worker.shader.rays(), ..worker.outcome }
         });
@@ -148,6 +149,8 @@ pub(super) struct Worker<'j, 's, T> {
     footprints: Footprints<'j>,
     pub(super) shader: Shader<'s, T>,
     pub(super) tile: Tile,
+    /// Scratch: pixels whose probes are to be traced.
+    probed: Vec<[u32; 2]>,
     outcome: Outcome,
 }
 
@@ -208,13 +211,20 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// Traces the pixels that need it.
     fn trace_all(&mut self, tile: PixelRect, records: &mut [PixelRecord]) {
-        self.along_curve(tile, |worker, pixel| {
-            records[tile.idx(pixel).expect("the curve stays in the tile")] = worker.traced(pixel);
+        self.along_curve(tile, |worker, pixels| {
+            for pixel in pixels {
+                records[tile.idx(pixel).expect("the curve stays in the tile")] = worker.traced(pixel);
+            }
         });
     }
 
-    /// Goes to every pixel of the largest cells that are not empty, along a Z curve: neighbours hit the same blocks.
-    pub(super) fn along_curve(&mut self, tile: PixelRect, mut visit: impl FnMut(&mut Self, [u32; 2])) {
+    /// Goes to the largest cells that are not empty, and hands over the pixels of each along a Z curve: neighbours hit
+    /// the same blocks.
+    pub(super) fn along_curve(
+        &mut self,
+        tile: PixelRect,
+        mut visit: impl FnMut(&mut Self, &mut dyn Iterator<Item = [u32; 2]>),
+    ) {
         let place = |k: u32| [tile.x0 + even_bits(k), tile.y0 + even_bits(k >> 1)];
         let per_cell = CELL_SIDES[0].pow(2);
         for first in (0..TILE_SIDE.pow(2)).step_by(per_cell as usize) {
@@ -224,7 +234,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
             }
             self.shader.aim(self.job.camera, largest.pixels());
             let pixels = (first..first + per_cell).map(place);
-            pixels.filter(|&pixel| tile.idx(pixel).is_some()).for_each(|pixel| visit(self, pixel));
+            visit(self, &mut pixels.filter(|&pixel| tile.idx(pixel).is_some()));
         }
     }
 
@@ -284,7 +294,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
             } else if is_hopeless {
                 Cell::Split(Reason::Every)
             } else {
-                place.probe_pixels().into_iter().for_each(|pixel| self.trace_probe(pixel));
+                self.trace_probes(place.probe_pixels(), |_, _| true);
                 self.judge(&place)
             };
             self.tile.set_cell(&place, cell);
@@ -296,22 +306,33 @@ impl<T: Tracer> Worker<'_, '_, T> {
         }
     }
 
-    pub(super) fn trace_probe(&mut self, pixel: [u32; 2]) {
-        if self.tile.probe(pixel).is_some() {
-            return;
+    /// Traces the centres of those pixels, none of them given twice, that are wanted and were not traced.
+    pub(super) fn trace_probes(
+        &mut self,
+        pixels: impl IntoIterator<Item = [u32; 2]>,
+        is_wanted: impl Fn(&Tile, [u32; 2]) -> bool,
+    ) {
+        let Self { job, footprints, shader, tile, probed, .. } = self;
+        probed.clear();
+        for pixel in pixels {
+            if tile.probe(pixel).is_some() || !is_wanted(tile, pixel) {
+                continue;
+            }
+            if footprints.is_empty(single(pixel)) {
+                let sample = Sample { radiance: job.appearance.background, first: FirstHit::NONE };
+                tile.set_probe(pixel, TracedProbe::new(Probe { sample, smooth: None }, Built::default()));
+            } else {
+                probed.push(pixel);
+            }
         }
-        let interpolation = self.job;
-        let before = self.shader.misses();
-        let probe = if self.footprints.is_empty(single(pixel)) {
-            let sample = Sample { radiance: interpolation.appearance.background, first: FirstHit::NONE };
-            Probe { sample, smooth: None }
-        } else {
-            let (ray, sampler) = interpolation.pixels().sample(pixel, 0);
-            self.shader.probe(interpolation.camera, ray, sampler)
-        };
-        let shown = Shown::new(probe.sample.radiance);
-        let misses = self.shader.misses() - before;
-        self.tile.set_probe(pixel, TracedProbe { probe, shown, seen: [shown; 2], misses });
+        let (mut traced, mut before) = (probed.iter(), shader.misses());
+        let samples = probed.iter().map(|&pixel| job.pixels().sample(pixel, 0));
+        shader.probes(job.camera, samples, |shader, probe| {
+            let pixel = *traced.next().expect("a probe for each pixel");
+            let misses = shader.misses();
+            tile.set_probe(pixel, TracedProbe::new(probe, misses - before));
+            before = misses;
+        });
     }
 
     /// The pixel, unless it is to be interpolated: then a mere note of that.

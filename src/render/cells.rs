@@ -48,6 +48,14 @@ pub(super) struct TracedProbe {
     pub misses: Built,
 }
 
+impl TracedProbe {
+    /// Of the first sample of a pixel.
+    pub fn new(probe: Probe, misses: Built) -> Self {
+        let shown = Shown::new(probe.sample.radiance);
+        Self { probe, shown, seen: [shown; 2], misses }
+    }
+}
+
 /// A tile at work.
 pub(super) struct Tile {
     origin: [u32; 2],

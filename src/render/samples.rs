@@ -17,7 +17,7 @@
 //! 2. Pixels at the sides of a tile are never settled: their neighbours beyond are not known.
 
 use super::adaptive::{CREASE_COSINE, Worker};
-use super::cells::{Cell, TracedProbe};
+use super::cells::{Cell, Tile, TracedProbe};
 use super::film::PixelRecord;
 use super::follow::{Shown, around, follow};
 use super::tiles::PixelRect;
@@ -44,11 +44,8 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// Traces the first sample of every pixel that is not interpolated.
     pub(super) fn look_everywhere(&mut self, tile: PixelRect) {
-        self.along_curve(tile, |worker, pixel| {
-            if matches!(worker.tile.find(pixel).1, Cell::Split(_)) {
-                worker.trace_probe(pixel);
-            }
-        });
+        let is_split = |tile: &Tile, pixel| matches!(tile.find(pixel).1, Cell::Split(_));
+        self.along_curve(tile, |worker, pixels| worker.trace_probes(pixels, is_split));
     }
 
     /// Traces as many samples of a pixel as it needs, where its first may have been traced.

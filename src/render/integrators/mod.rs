@@ -89,7 +89,15 @@ impl<'a, T: Tracer> Shader<'a, T> {
         rays: impl IntoIterator<Item = (Ray, Sampler)>,
         mut take: impl FnMut(Sample),
     ) {
-        let mut rays = rays.into_iter();
+        self.trace_together(camera, rays.into_iter(), |_, sample, _| take(sample));
+    }
+
+    fn trace_together(
+        &mut self,
+        camera: &Camera,
+        mut rays: impl Iterator<Item = (Ray, Sampler)>,
+        mut take: impl FnMut(&Self, Sample, Option<Interaction<'a>>),
+    ) {
         let most = if self.settings.shows_misses() { 1 } else { PACKET };
         loop {
             let (mut packet, mut directions, mut hits) = ([None; PACKET], [DVec3::ZERO; PACKET], [None; PACKET]);
@@ -104,7 +112,8 @@ impl<'a, T: Tracer> Shader<'a, T> {
             let misses_before = self.misses();
             self.tracer.closest_from(camera.eye(), &directions[..n], &mut hits[..n]);
             for ((ray, sampler), hit) in packet.iter().flatten().zip(hits) {
-                take(self.shade(camera, ray, hit, *sampler, misses_before).0);
+                let (sample, hit) = self.shade(camera, ray, hit, *sampler, misses_before);
+                take(self, sample, hit);
             }
         }
     }

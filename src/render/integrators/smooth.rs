@@ -144,20 +144,26 @@ impl Trail {
 }
 
 impl<T: Tracer> Shader<'_, T> {
-    /// As [`sample`](Self::sample), with what can be interpolated. For the `whitted` integrator.
-    pub(in crate::render) fn probe(&mut self, camera: &Camera, ray: Ray, sampler: Sampler) -> Probe {
-        let (sample, hit) = self.trace(camera, ray, sampler);
-        let smooth = hit.map(|x| Smooth {
-            mesh: x.hit.primitive.mesh,
-            outside: x.outside,
-            normal: x.normal.as_vec3(),
-            inverse_depth: 1.0 / sample.first.depth,
-            secondary: sample.radiance - self.trail.first_local,
-            lights: self.trail.first_lights,
-            signature: self.trail.signature,
-            mirrored_normal: self.trail.mirrored_normal,
+    /// As [`samples`](Self::samples), with what can be interpolated. For the `whitted` integrator.
+    pub(in crate::render) fn probes(
+        &mut self,
+        camera: &Camera,
+        rays: impl Iterator<Item = (Ray, Sampler)>,
+        mut take: impl FnMut(&Self, Probe),
+    ) {
+        self.trace_together(camera, rays, |shader, sample, hit| {
+            let smooth = hit.map(|x| Smooth {
+                mesh: x.hit.primitive.mesh,
+                outside: x.outside,
+                normal: x.normal.as_vec3(),
+                inverse_depth: 1.0 / sample.first.depth,
+                secondary: sample.radiance - shader.trail.first_local,
+                lights: shader.trail.first_lights,
+                signature: shader.trail.signature,
+                mirrored_normal: shader.trail.mirrored_normal,
+            });
+            take(shader, Probe { sample, smooth });
         });
-        Probe { sample, smooth }
     }
 }
 
