@@ -155,13 +155,13 @@ impl RayPacket {
         is_nearer
     }
 
-    /// A ray parameter of lattice space in units of the direction that [`Self::new`] was given.
+    /// A ray parameter of lattice space in units of the direction that [`Self::set`] was given.
     #[inline(always)]
     pub fn caller_t(&self, ray: usize, t: f32) -> f32 {
         caller_t(t, 0.0, self.t_unit[ray])
     }
 
-    /// Beyond there is nothing to be hit by any of the rays, in units of the directions that [`Self::new`] was given.
+    /// Beyond there is nothing to be hit by any of the rays, in units of the directions that [`Self::set`] was given.
     #[inline(always)]
     pub fn farthest(&self) -> f32 {
         let mut farthest = f32::MIN;

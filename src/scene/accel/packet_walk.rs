@@ -37,69 +37,91 @@ pub struct PacketWalk<'t, K: Kernel> {
     /// Lanes of the group still to be visited.
     lanes: u32,
     nodes: (&'t [NodeBoxes], &'t [Refs]),
-    /// Below a node of the front: the present node, and those above that have lanes left.
+    /// Below a node of the front: the present node, and its lanes still to be visited.
     node: u32,
     order: K::O,
+    /// Nodes above the present one that have lanes left.
     stack: &'t mut [OpenNode],
+    /// How many.
     n: usize,
 }
 
-impl<'t, K: Kernel> PacketWalk<'t, K> {
+/// A lane that rays of the packet meet.
+struct Met {
+    reference: u32,
+    /// That of a leaf.
+    slot: u32,
+    /// The rays, as bits.
+    rays: u32,
+}
+
+impl<K: Kernel> PacketWalk<'_, K> {
     /// The next patch whose box rays of the packet meet, and which ones, as bits.
     #[inline(always)]
     pub fn next(&mut self, packet: &RayPacket) -> Option<(LeafRef, u32)> {
+        loop {
+            let Met { reference, slot, rays } = match self.next_below(packet) {
+                Some(met) => met,
+                None => self.next_of_front(packet)?,
+            };
+            if reference & LEAF != 0 {
+                return Some((LeafRef { slot, patch: PatchId(reference & !LEAF) }, rays));
+            }
+            self.go_down(packet, reference);
+        }
+    }
+
+    /// The next lane below a node of the front.
+    #[inline(always)]
+    fn next_below(&mut self, packet: &RayPacket) -> Option<Met> {
         let k = self.kernel;
         loop {
-            if k.has_any(self.order) {
-                let lane = k.first(self.order).0;
-                self.order = k.without(self.order, lane);
-                let rays = self.nodes.0[self.node as usize].meeting(k, packet, lane);
-                if rays == 0 {
-                    continue;
-                }
-                let reference = self.nodes.1[self.node as usize][lane % LANES];
-                if reference & LEAF != 0 {
-                    let slot = self.node * LANES as u32 + lane as u32;
-                    return Some((LeafRef { slot, patch: PatchId(reference & !LEAF) }, rays));
-                }
-                self.stack[self.n] = OpenNode { order: k.store_order(self.order), node: self.node };
-                self.n += usize::from(k.has_any(self.order));
-                self.start_at(packet, reference);
-            } else if self.n != 0 {
-                self.n -= 1;
+            if !k.has_any(self.order) {
+                self.n = self.n.checked_sub(1)?;
                 let above = &self.stack[self.n];
                 (self.node, self.order) = (above.node, k.load_order(&above.order));
-            } else if self.lanes != 0 {
-                let lane = self.lanes.trailing_zeros() as usize % LANES;
-                self.lanes &= self.lanes - 1;
-                let rays = self.group.boxes.meeting(k, packet, lane);
-                if rays == 0 {
-                    continue;
-                }
-                let reference = self.group.refs[lane];
-                if reference & LEAF != 0 {
-                    return Some((LeafRef { slot: self.group.slots[lane], patch: PatchId(reference & !LEAF) }, rays));
-                }
-                self.start_at(packet, reference);
-            } else {
-                let (group, rest) = self.rest.split_first()?;
-                if group.enter > packet.farthest() {
-                    return None;
-                }
-                (self.group, self.rest) = (group, rest);
-                self.lanes = {
-                    let (enter, leave) = group.boxes.seen_by(k, packet);
-                    k.le(enter, leave)
-                };
+            }
+            let lane = k.first(self.order).0;
+            self.order = k.without(self.order, lane);
+            let rays = self.nodes.0[self.node as usize].meeting(k, packet, lane);
+            if rays != 0 {
+                let reference = self.nodes.1[self.node as usize][lane % LANES];
+                return Some(Met { reference, slot: self.node * LANES as u32 + lane as u32, rays });
             }
         }
     }
 
-    /// Goes on at a node.
+    /// The next lane of the front's groups.
     #[inline(always)]
-    fn start_at(&mut self, packet: &RayPacket, node: u32) {
-        let (enter, leave) = self.nodes.0[node as usize].seen_by(self.kernel, packet);
-        (self.node, self.order) = (node, self.kernel.in_order(enter, leave));
+    fn next_of_front(&mut self, packet: &RayPacket) -> Option<Met> {
+        loop {
+            while self.lanes == 0 {
+                let (group, rest) = self.rest.split_first()?;
+                if group.enter > packet.farthest() {
+                    return None;
+                }
+                let (enter, leave) = group.boxes.seen_by(self.kernel, packet);
+                (self.group, self.rest, self.lanes) = (group, rest, self.kernel.le(enter, leave));
+            }
+            let lane = self.lanes.trailing_zeros() as usize % LANES;
+            self.lanes &= self.lanes - 1;
+            let rays = self.group.boxes.meeting(self.kernel, packet, lane);
+            if rays != 0 {
+                return Some(Met { reference: self.group.refs[lane], slot: self.group.slots[lane], rays });
+            }
+        }
+    }
+
+    /// Goes on at a node below the present one, or below the front.
+    #[inline(always)]
+    fn go_down(&mut self, packet: &RayPacket, node: u32) {
+        let k = self.kernel;
+        if k.has_any(self.order) {
+            self.stack[self.n] = OpenNode { order: k.store_order(self.order), node: self.node };
+            self.n += 1;
+        }
+        let (enter, leave) = self.nodes.0[node as usize].seen_by(k, packet);
+        (self.node, self.order) = (node, k.in_order(enter, leave));
     }
 }
 
