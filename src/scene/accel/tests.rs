@@ -360,21 +360,21 @@ fn a_visit_finds_every_patch_but_for_those_in_boxes_that_are_not_entered() {
     assert!((0..3000).all(|k| !is_left(&boxes[k]) || found.binary_search(&k).is_ok()));
 }
 
-/// The leaves that a packet visits from its bundle's front, with the rays for which it does; `None` if the rays are no
-/// packet.
-struct PacketVisits<'a>(&'a TopLevel, DVec3, &'a [DVec3; PACKET]);
+/// The leaves that a packet of rays that end at a place visits from its bundle's front, with the rays for which it does;
+/// `None` if the rays are no packet.
+struct PacketVisits<'a>(&'a TopLevel, DVec3, &'a [DVec3; PACKET], f32);
 
 impl Task for PacketVisits<'_> {
     type Output = Option<Vec<(LeafRef, u32)>>;
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> Self::Output {
-        let Self(tree, eye, directions) = self;
+        let Self(tree, eye, directions, t_max) = self;
         let bundle: RayBounds = directions.iter().map(|&direction| Ray::new(eye, direction)).collect();
         let (mut front, mut packet, mut stack) = (Front::default(), RayPacket::default(), TraversalStack::default());
         assert!(tree.find_front(kernel, &bundle, &mut front));
         let along = [0, 1, 2].map(|axis| directions.map(|d| d[axis]));
         let origin = kernel.load4(&[eye.x, eye.y, eye.z, 0.0]);
-        if !packet.set(kernel, origin, &along, &[f32::INFINITY; PACKET]) {
+        if !packet.set(kernel, origin, &along, &[t_max; PACKET]) {
             return None;
         }
         let is_empty = front.is_empty();
@@ -393,8 +393,9 @@ fn a_packet_visits_every_box_that_one_of_its_rays_meets() {
             let (eye, target) = (random_point(i, 1.2e7), boxes[(i % n) as usize].center().as_dvec3());
             let spread = [0.0, 1e5, 1e6][i as usize % 3];
             let directions = std::array::from_fn(|k| target + random_point(8 * i + k as u64, spread) - eye);
-            let visits = run(PacketVisits(&tree, eye, &directions));
-            assert_eq!(visits, PacketVisits(&tree, eye, &directions).run(Portable), "{n} boxes, packet {i}");
+            let visits = run(PacketVisits(&tree, eye, &directions, f32::INFINITY));
+            let portable = PacketVisits(&tree, eye, &directions, f32::INFINITY).run(Portable);
+            assert_eq!(visits, portable, "{n} boxes, packet {i}");
             let Some(visits) = visits else { continue };
             n_packets += 1;
             n_visits += visits.iter().map(|(_, rays)| rays.count_ones()).sum::<u32>();
@@ -409,4 +410,25 @@ fn a_packet_visits_every_box_that_one_of_its_rays_meets() {
     }
     assert!(n_packets > 400 && n_met > 10_000, "{n_packets} packets met {n_met} boxes");
     assert!(f64::from(n_visits) < 1.01 * f64::from(n_met), "{n_visits} visits of {n_met} boxes");
+}
+
+#[test]
+fn a_packet_visits_no_box_beyond_the_ends_of_its_rays() {
+    let boxes = scattered(3000, 1e6);
+    let tree = TopLevel::build(&boxes, 2);
+    let (mut n_near, mut n_far) = (0, 0);
+    for i in 0..200 {
+        let (eye, target) = (random_point(i, 1.2e7), boxes[i as usize].center().as_dvec3());
+        let directions = std::array::from_fn(|k| target + random_point(8 * i + k as u64, 1e5) - eye);
+        let Some(visits) = run(PacketVisits(&tree, eye, &directions, 0.5)) else { continue };
+        for (k, &direction) in directions.iter().enumerate() {
+            let entries = boxes.iter().enumerate().filter_map(|(p, b)| entry(b, eye, direction).map(|t| (p as u32, t)));
+            for (patch, t) in entries {
+                let is_visited = visits.iter().any(|(leaf, rays)| leaf.patch.0 == patch && rays >> k & 1 == 1);
+                assert_eq!(is_visited, t <= 0.5, "packet {i}, ray {k}, box {patch} at {t}");
+                (n_near, n_far) = if t <= 0.5 { (n_near + 1, n_far) } else { (n_near, n_far + 1) };
+            }
+        }
+    }
+    assert!(n_near > 1000 && n_far > 1000, "{n_near} boxes before the ends, {n_far} beyond");
 }
