@@ -7,6 +7,7 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use glam::{DAffine3, DVec2, DVec3};
 use lazytess::cache::CacheConfig;
+use lazytess::grid::PACKET;
 use lazytess::math::Intersect;
 use lazytess::mesh::{ControlMesh, shapes};
 use lazytess::render::tiles::{PACKET_SIZE, PixelRect};
@@ -67,12 +68,10 @@ fn cache(world: &World, config: CacheConfig) -> GridCache {
 }
 
 fn trace(world: &World, cache: &GridCache, frame: &Frame) -> usize {
-    const PACKET: usize = (PACKET_SIZE[0] * PACKET_SIZE[1]) as usize;
     let mut tracer = Intersector::new(world, cache);
     let (mut hits, mut n_hits) = ([None; PACKET], 0);
     for Tile { rect, directions } in &frame.tiles {
-        let corners = [[rect.x0, rect.y0], [rect.x1, rect.y1]].map(|corner| DVec2::from(corner.map(f64::from)));
-        tracer.aim(&frame.camera.bundle(corners, SIZE));
+        tracer.aim(&frame.camera.bundle(rect.corners(), SIZE));
         for directions in directions.chunks_exact(PACKET) {
             tracer.closest_from(frame.camera.eye(), directions, &mut hits);
             n_hits += black_box(&hits).iter().flatten().count();

@@ -18,6 +18,7 @@
 //! Each pass runs K times; rates are million rays per wall second (`median`, `best`) and per CPU second of the threads
 //! (`cpu`).
 
+use crate::grid::PACKET;
 use crate::io::process::thread_cpu;
 use crate::math::{DBounds, Hit, Intersect, PrimitiveRef, Ray, RayBounds};
 use crate::parallel::on_threads;
@@ -46,8 +47,7 @@ struct BenchRay {
 fn bundle(camera: &Camera, tile: PixelRect, size: [u32; 2]) -> RayBounds {
     /// By how much rounding to f32 moves a number up to 1.
     const ROUNDING: f64 = 1.0 / (1u32 << 25) as f64;
-    let corners = [[tile.x0, tile.y0], [tile.x1, tile.y1]].map(|corner| DVec2::from(corner.map(f64::from)));
-    let exact = camera.bundle(corners, size);
+    let exact = camera.bundle(tile.corners(), size);
     let eye = camera.eye().as_vec3().as_dvec3();
     RayBounds { origin: DBounds { min: eye, max: eye }, direction: exact.direction.expanded(ROUNDING) }
 }
@@ -417,7 +417,7 @@ fn trace_in_packets<T: Intersect>(
     mut hits: &mut [BenchHit],
     bench_hit: &impl Fn(Option<&Hit>) -> BenchHit,
 ) {
-    let mut found = [None; (PACKET_SIZE[0] * PACKET_SIZE[1]) as usize];
+    let mut found = [None; PACKET];
     for block in tile.blocks(PACKET_SIZE) {
         let n = block.n_pixels();
         let of_block = directions.split_off(..n).expect("a ray for each pixel");

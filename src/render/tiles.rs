@@ -1,8 +1,13 @@
 //! Rectangles of pixels and the order in which they are rendered.
 
+use crate::grid::PACKET;
+use glam::DVec2;
+
 /// Columns and rows of pixels whose camera rays are traced together: as many as a packet holds. (A row of eight meets
 /// more patches than they do.)
 pub const PACKET_SIZE: [u32; 2] = [4, 2];
+
+const _: () = assert!(PACKET_SIZE[0] as usize * PACKET_SIZE[1] as usize == PACKET);
 
 /// A rectangle of pixels of the whole picture: columns `x0..x1`, rows `y0..y1`, row 0 at the top.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -36,6 +41,11 @@ impl PixelRect {
     /// Number of pixels.
     pub fn n_pixels(&self) -> usize {
         self.width() as usize * self.height() as usize
+    }
+
+    /// The upper left and the lower right corner, in pixels of the whole picture.
+    pub fn corners(&self) -> [DVec2; 2] {
+        [[self.x0, self.y0], [self.x1, self.y1]].map(|corner| DVec2::from(corner.map(f64::from)))
     }
 
     /// The pixels, row by row.

@@ -30,7 +30,7 @@ use crate::grid::PACKET;
 use crate::math::{Hit, Ray};
 use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use interaction::Interaction;
 use smooth::Trail;
 pub(super) use smooth::{LightMasks, Probe, Smooth, SmoothPoint};
@@ -73,8 +73,7 @@ impl<'a, T: Tracer> Shader<'a, T> {
 
     /// Announces that many of the next camera rays go through a part of the picture.
     pub(super) fn aim(&mut self, camera: &Camera, part: PixelRect) {
-        let corners = [[part.x0, part.y0], [part.x1, part.y1]].map(|corner| DVec2::from(corner.map(f64::from)));
-        self.tracer.aim(&camera.bundle(corners, self.settings.size));
+        self.tracer.aim(&camera.bundle(part.corners(), self.settings.size));
     }
 
     /// Traces a ray of `camera` and gathers light by the integrator of the settings.
