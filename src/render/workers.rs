@@ -226,11 +226,17 @@ impl PixelTracer<'_> {
 /// Says how to come back to the pixels at which a thread panicked.
 pub(super) struct PanicWitness(pub PixelRect);
 
+impl PanicWitness {
+    fn advice(&self) -> String {
+        let PixelRect { x0, y0, x1, y1 } = self.0;
+        format!("this happened at pixel ({x0}, {y0}) or beside it: repeat it with --crop {x0},{x1},{y0},{y1}")
+    }
+}
+
 impl Drop for PanicWitness {
     fn drop(&mut self) {
         if std::thread::panicking() {
-            let PixelRect { x0, y0, x1, y1 } = self.0;
-            eprintln!("this happened at pixel ({x0}, {y0}) or beside it: repeat it with --crop {x0},{y0},{x1},{y1}");
+            eprintln!("{}", self.advice());
         }
     }
 }
@@ -278,6 +284,12 @@ mod tests {
                 assert_eq!(other.rays, reference.rays);
             }
         }
+    }
+
+    #[test]
+    fn a_panic_tells_the_window_that_repeats_it() {
+        let advice = PanicWitness(PixelRect { x0: 8, y0: 20, x1: 12, y1: 22 }).advice();
+        assert!(advice.ends_with("--crop 8,12,20,22"), "{advice}");
     }
 
     #[test]
