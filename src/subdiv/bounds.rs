@@ -1,14 +1,19 @@
 //! Conservative boxes of parts of patches, without evaluating them.
 
 use super::eval::{Evaluator, Point, quarter};
+use super::extent::Extent;
 use super::parts::Parts;
 use super::plan::{NodeId, Plan, PlanLibrary, Step};
 use super::pole::{self, MOST_REFINED, PoleHull};
 use super::products::control_points;
 use super::regular::{self, BezierWeights, ControlPoints, GridHulls, MOST_PARTS, bezier_weights};
 use super::rows::Width;
-use crate::math::DBounds;
 use crate::math::simd;
+
+/// Steps that a pole's hull goes deeper than others: they take little there. Below its regular quarters the ring of the
+/// last one stands out on all sides, and boxes and plates are as much too thick. Rays look up 0.94 (bigguy, trex) and
+/// 0.91 (monsterfrog) of what they look up without, at rate 8, and preparing trex takes no longer.
+const MORE_AT_POLES: u32 = 2;
 
 /// The parameters of a whole patch.
 const WHOLE: [[f64; 2]; 2] = [[0.0, 1.0]; 2];
@@ -55,8 +60,8 @@ impl Evaluator {
         u: [f64; 2],
         v: [f64; 2],
         depth: u32,
-    ) -> DBounds {
-        let mut bounds = DBounds::EMPTY;
+    ) -> Extent {
+        let mut bounds = Extent::EMPTY;
         self.bound_parts(library, parts, 0, u, v, depth, &mut bounds);
         bounds
     }
@@ -70,18 +75,20 @@ impl Evaluator {
         u: [f64; 2],
         v: [f64; 2],
         depth: u32,
-        bounds: &mut DBounds,
+        bounds: &mut Extent,
     ) {
         if let Some(control) = parts.control(part) {
             return self.grow_by_hull(bounds, control, u, v);
         }
         let node = parts.node(part);
         if depth == 0 && matches!(library.plan(node), Plan::Split { in_hull: true, .. }) {
-            return parts.points(part).iter().for_each(|p| bounds.grow(p.to_vec()));
+            return parts.points(part).iter().for_each(|p| bounds.grow(*p));
         }
-        if let (WHOLE, Some([low, high])) = ([u, v], self.pole_hull(library, node, parts.points(part), depth)) {
-            bounds.grow(low.to_vec());
-            bounds.grow(high.to_vec());
+        if let (WHOLE, Some([low, high])) =
+            ([u, v], self.pole_hull(library, node, parts.points(part), depth + MORE_AT_POLES))
+        {
+            bounds.grow(low);
+            bounds.grow(high);
             return;
         }
         let Some(first) = parts.quarters(library, part) else {
@@ -105,9 +112,9 @@ impl Evaluator {
         u: [f64; 2],
         v: [f64; 2],
         depth: u32,
-    ) -> DBounds {
+    ) -> Extent {
         let ring = self.start_ring(ring);
-        let mut bounds = DBounds::EMPTY;
+        let mut bounds = Extent::EMPTY;
         self.bound(library, node, ring, u, v, depth, &mut bounds);
         bounds
     }
@@ -121,7 +128,7 @@ impl Evaluator {
         u: [f64; 2],
         v: [f64; 2],
         depth: u32,
-        bounds: &mut DBounds,
+        bounds: &mut Extent,
     ) {
         match library.plan(node) {
             Plan::Regular(rows, turn) => {
@@ -130,7 +137,7 @@ impl Evaluator {
             }
             Plan::Split { in_hull: true, .. } if depth == 0 => {
                 let n = library.n_points(node);
-                self.points[ring..ring + n].iter().for_each(|p| bounds.grow(p.to_vec()));
+                self.points[ring..ring + n].iter().for_each(|p| bounds.grow(*p));
             }
             Plan::Split { step, children, .. } => {
                 let start = self.points.len();
@@ -154,14 +161,30 @@ impl Evaluator {
         }
     }
 
+    /// How far a part of a regular patch reaches: the Bézier hull, of the whole patch those of its four quarters, which
+    /// bulge less. (Rays look up 0.95 of what they look up with one hull at rate 8 on bigguy, 0.96 on trex.)
+    pub fn regular_extent(&mut self, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) -> Extent {
+        let mut extent = Extent::EMPTY;
+        if [u, v] != WHOLE {
+            self.grow_by_hull(&mut extent, control, u, v);
+            return extent;
+        }
+        let mut quarters = [[Point::ZERO; 2]; MOST_PARTS + 2];
+        self.regular_grid_boxes(control, WHOLE, 2, &mut quarters);
+        for hull in [0, 1, MOST_PARTS, MOST_PARTS + 1].map(|quarter| quarters[quarter]) {
+            hull.into_iter().for_each(|p| extent.grow(p));
+        }
+        extent
+    }
+
     /// Enlarges `bounds` by the Bézier hull of a part of a regular patch.
-    pub fn grow_by_hull(&mut self, bounds: &mut DBounds, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) {
+    pub fn grow_by_hull(&mut self, bounds: &mut Extent, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) {
         let [of_u, of_v] = &mut self.hulls;
         let hull = match [u, v] {
             WHOLE => simd::run(regular::WholeHull { control }),
             _ => simd::run(regular::Hull { control, u: of_u.get(u), v: of_v.get(v) }),
         };
-        hull.iter().for_each(|p| bounds.grow(p.to_vec()));
+        hull.iter().for_each(|p| bounds.grow(*p));
     }
 }
 
@@ -198,9 +221,9 @@ impl Evaluator {
         out: &mut GridBoxes,
     ) -> bool {
         if side == 1 {
-            let mut bounds = DBounds::EMPTY;
+            let mut bounds = Extent::EMPTY;
             self.bound_parts(library, parts, part, u, v, depth, &mut bounds);
-            out[first] = [bounds.min, bounds.max].map(|p| Point::new(p.x, p.y, p.z));
+            out[first] = [bounds.low, bounds.high];
             return true;
         }
         if let Some(control) = parts.control(part) {

@@ -11,12 +11,13 @@
 //! than the guard, of one that is a whole guard away from the boundary.
 
 use super::eval::{Evaluator, Point, SurfaceSample};
+use super::extent::Extent;
 use super::regular::MOST_PARTS;
 use super::surface::{PatchPoints, Surface};
 use crate::ids::{FaceId, PatchId};
 use crate::math::lattice_grid::MOST_NEAR;
 use crate::math::simd::{self, Kernel, Task};
-use crate::math::{Bounds, LatticeGrid, PointGrid, Rounding};
+use crate::math::{Bounds, LatticeGrid, Plate, PointGrid, Rounding};
 use crate::topology::HalfEdges;
 use glam::{DVec3, Vec3};
 
@@ -308,6 +309,13 @@ impl Dicer {
         lane
     }
 
+    /// As [`load`](Self::load), with the heights of points.
+    fn load_with_heights(&mut self, surface: &Surface, patch: PatchId) -> usize {
+        let lane = patch.idx() % N_REMEMBERED;
+        surface.load_with_heights(patch, &mut self.points[lane]);
+        lane
+    }
+
     /// Position and tangents at a point of a patch, in lattice units without [`LATTICE_SHIFT`].
     pub fn sample(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> SurfaceSample {
         let lane = self.load(surface, patch);
@@ -331,7 +339,7 @@ impl Dicer {
         j: [u32; 2],
         depth: u32,
     ) -> Bounds {
-        let lane = self.load(surface, patch);
+        let lane = self.load_with_heights(surface, patch);
         let points = &mut self.points[lane];
         let range = |[a, b]: [u32; 2], n: u32| [f64::from(a) / f64::from(n), f64::from(b) / f64::from(n)];
         let (u, v) = (range(i, rates.n_u), range(j, rates.n_v));
@@ -358,7 +366,7 @@ impl Dicer {
                 bounds = bounds.union(surface.bounds(points, &mut self.evaluator, u, v, depth));
             }
         }
-        to_lattice_box(bounds.min, bounds.max)
+        to_lattice_box(&bounds)
     }
 
     /// Appends the [`bounds`](Self::bounds) of `n[0]` x `n[1]` parts of `side` x `side` cells from (`from[0]`,
@@ -382,7 +390,7 @@ impl Dicer {
         if !is_plain || !is_whole || n[0] != n[1] || ![2, 4].contains(&n[0]) {
             return false;
         }
-        let lane = self.load(surface, patch);
+        let lane = self.load_with_heights(surface, patch);
         let at = |k: usize, i: u32| f64::from(i) / f64::from(cells[k]);
         let rectangle = [0, 1].map(|k| [at(k, from[k]), at(k, from[k] + n[k] * side)]);
         let n = n[0] as usize;
@@ -391,43 +399,54 @@ impl Dicer {
             return false;
         }
         let boxes = boxes.chunks_exact(MOST_PARTS).take(n).flat_map(|row| &row[..n]);
-        out.extend(boxes.map(|[low, high]| to_lattice_box(low.to_vec(), high.to_vec())));
+        out.extend(boxes.map(|&[low, high]| to_lattice_box(&Extent { low, high })));
         true
     }
 
-    /// As [`bounds`](Self::bounds) for a whole patch at any rates.
-    pub fn patch_bounds(&mut self, surface: &Surface, patch: PatchId, depth: u32) -> Bounds {
-        let lane = self.load(surface, patch);
-        let b = surface.bounds(&mut self.points[lane], &mut self.evaluator, [0.0, 1.0], [0.0, 1.0], depth);
-        to_lattice_box(b.min, b.max)
+    /// As [`bounds`](Self::bounds) for a whole patch at any rates; with a plate that holds its vertices as well, across
+    /// its middle normal.
+    pub fn patch_bounds(&mut self, surface: &Surface, patch: PatchId, depth: u32) -> (Bounds, Plate) {
+        let lane = self.load_with_heights(surface, patch);
+        let points = &mut self.points[lane];
+        let extent = surface.bounds(points, &mut self.evaluator, [0.0, 1.0], [0.0, 1.0], depth);
+        (to_lattice_box(&extent), to_lattice_plate(points.normal(), &extent))
     }
 }
 
+/// By how much rounding moves a coordinate at most, and a little for evaluation errors.
+const ROUNDED: f64 = 0.51;
+
 /// Rounds outwards to lattice points, by what rounding a vertex can move it and a little for evaluation errors. The
 /// result is exact in f32, since lattice coordinates stay below 2^24.
-fn to_lattice_box(min: DVec3, max: DVec3) -> Bounds {
-    simd::run(LatticeBox { min, max })
+fn to_lattice_box(extent: &Extent) -> Bounds {
+    simd::run(LatticeBox { extent })
 }
 
-struct LatticeBox {
-    min: DVec3,
-    max: DVec3,
+struct LatticeBox<'a> {
+    extent: &'a Extent,
 }
 
-impl Task for LatticeBox {
+impl Task for LatticeBox<'_> {
     type Output = Bounds;
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) -> Bounds {
-        let Self { min, max } = self;
-        let low = k.add4(k.load4(&[min.x, min.y, min.z, 0.0]), k.splat4(LATTICE_SHIFT - 0.51));
+        let Extent { low, high } = self.extent;
+        let low = k.add4(k.load4(&low.0), k.splat4(LATTICE_SHIFT - ROUNDED));
         // What is to be rounded up is rounded down beyond zero.
-        let high = k.sub4(k.load4(&[-max.x, -max.y, -max.z, 0.0]), k.splat4(LATTICE_SHIFT + 0.51));
+        let high = k.sub4(k.sub4(k.splat4(-0.0), k.load4(&high.0)), k.splat4(LATTICE_SHIFT + ROUNDED));
         let (low, high) = (k.store4(k.floor4(low)), k.store4(k.floor4(high)));
         Bounds {
             min: Vec3::new(low[0] as f32, low[1] as f32, low[2] as f32),
             max: Vec3::new(-high[0] as f32, -high[1] as f32, -high[2] as f32),
         }
     }
+}
+
+/// The plate of what reaches so far, for vertices.
+fn to_lattice_plate(normal: [i8; 3], extent: &Extent) -> Plate {
+    let [sum, length] = [normal.map(f64::from), normal.map(|x| f64::from(x).abs())].map(|x| x.iter().sum::<f64>());
+    let [low, high] = [extent.low, extent.high].map(|p| p.0[3] + LATTICE_SHIFT * sum);
+    Plate::around(normal, low - ROUNDED * length, high + ROUNDED * length)
 }
 
 impl OwnerScratch {
@@ -501,5 +520,55 @@ impl OwnerScratch {
         surface.load(patch, &mut self.points);
         surface.grid(&mut self.points, &mut self.evaluator, None, [u], [v], &mut self.single);
         round_point(self.single.point(0, 0)).0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::random::random_mesh;
+    use crate::mesh::shapes;
+
+    /// Boxes and plates of whole patches hold what is diced at any rate, and parts' boxes what of it is theirs.
+    #[test]
+    fn what_is_diced_lies_in_boxes_and_plates() {
+        let (mut dicer, mut grid, mut n) = (Dicer::default(), LatticeGrid::default(), 0);
+        for mesh in shapes::all().into_iter().map(|(_, mesh)| mesh).chain((0..60).map(random_mesh)) {
+            let surface = Surface::new(&mesh, 1).unwrap();
+            for patch in surface.visible_patches() {
+                // Before and after there are points without heights.
+                let (bounds, plate) = dicer.patch_bounds(&surface, patch, 3);
+                let rates = surface.uniform_rates(patch, 1 + patch.0 % 9);
+                dicer.dice(&surface, patch, &rates, [0, rates.n_u], [0, rates.n_v], &mut grid);
+                assert_eq!((bounds, plate), dicer.patch_bounds(&surface, patch, 3));
+                let part = dicer.bounds(&surface, patch, &rates, [0, rates.n_u], [0, rates.n_v], 0);
+                for p in grid.points().map(|p| DVec3::from_array(p.map(f64::from))) {
+                    let height = Plate::height(plate.normal, p);
+                    assert!((f64::from(plate.low)..=f64::from(plate.high)).contains(&height), "{patch:?} {plate:?}");
+                    for b in [bounds, part] {
+                        assert!((b.min.as_dvec3().cmple(p) & p.cmple(b.max.as_dvec3())).all(), "{patch:?} {b:?} {p}");
+                    }
+                    n += 1;
+                }
+            }
+        }
+        assert!(n > 30_000, "{n} vertices");
+    }
+
+    /// A plane that is no axis's: its patches are as thick as rounding makes them, and their boxes are cubes.
+    #[test]
+    fn plates_of_a_plane_are_thin() {
+        let at = |k: usize| DVec3::new((k % 6) as f64, (k / 6) as f64, 0.0);
+        let turned = |p: DVec3| glam::DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 0.8) * p;
+        let faces: Vec<Vec<u32>> = (0..25).map(|k| k / 5 * 6 + k % 5).map(|a| vec![a, a + 1, a + 7, a + 6]).collect();
+        let mesh = crate::mesh::ControlMesh::from_polygons((0..36).map(at).map(turned).collect(), &faces).unwrap();
+        let surface = Surface::new(&mesh, 1).unwrap();
+        for patch in surface.visible_patches() {
+            let (bounds, plate) = Dicer::default().patch_bounds(&surface, patch, 3);
+            // Normals are rounded to a hundredth.
+            let width = Plate::height(plate.normal.map(i8::abs), (bounds.max - bounds.min).as_dvec3());
+            let thickness = f64::from(plate.high - plate.low);
+            assert!(0.0 < thickness && thickness < 0.02 * width, "{patch:?}: {thickness} of {width}");
+        }
     }
 }

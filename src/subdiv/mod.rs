@@ -32,6 +32,7 @@ pub mod dice;
 mod draft;
 pub mod edits;
 pub mod eval;
+mod extent;
 mod fans;
 mod kinds;
 pub mod local;

@@ -41,6 +41,11 @@ impl Parts {
         &mut self.points
     }
 
+    /// The new ring, as far as it has been put here.
+    pub fn ring_mut(&mut self) -> &mut [Point] {
+        &mut self.points
+    }
+
     /// The patch of the ring starts at `node`.
     pub fn begin(&mut self, library: &PlanLibrary, node: NodeId) {
         let part = Part { node, first: 0, n_points: self.points.len() as u32, is_regular: false, quarters: 0 };

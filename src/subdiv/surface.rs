@@ -3,6 +3,7 @@
 use super::bounds::GridBoxes;
 use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, sample_regular};
+use super::extent::Extent;
 use super::kinds::plan_faces;
 use super::local::RingWalker;
 use super::parts::Parts;
@@ -13,7 +14,7 @@ use super::rows::Width;
 use super::rules::RuleSet;
 use crate::error::Result;
 use crate::ids::{FaceId, PatchId};
-use crate::math::{DBounds, PointGrid};
+use crate::math::{DBounds, Plate, PointGrid};
 use crate::mesh::ControlMesh;
 use crate::topology::{FaceIndex, HalfEdges, Topology};
 use glam::DVec3;
@@ -85,6 +86,8 @@ pub struct Surface {
 pub struct PatchPoints {
     /// The surface and the patch.
     of: Option<(u64, PatchId)>,
+    /// What the heights of points are measured along, if they are; zero for patches under edits.
+    normal: Option<[i8; 3]>,
     node: NodeId,
     control: ControlPoints,
     parts: Parts,
@@ -115,10 +118,18 @@ impl Walker {
     }
 }
 
+impl PatchPoints {
+    /// What heights are measured along; zero if they are not known.
+    pub fn normal(&self) -> [i8; 3] {
+        self.normal.unwrap_or_default()
+    }
+}
+
 impl Default for PatchPoints {
     fn default() -> Self {
         Self {
             of: None,
+            normal: None,
             node: REGULAR,
             control: [Point::ZERO; 16],
             parts: Parts::default(),
@@ -212,7 +223,7 @@ impl Surface {
             None => (FaceId(patch.0), 0),
             Some(index) => {
                 let face = index.face(patch.0);
-                (FaceId(face), patch.0 - index.corners(face).0)
+                (FaceId(face), patch.0 - index.corners_at(patch.0).0)
             }
         }
     }
@@ -269,17 +280,33 @@ impl Surface {
     }
 
     /// Fetches what decides a patch, unless `points` holds it already.
+    #[inline]
     pub fn load(&self, patch: PatchId, points: &mut PatchPoints) {
-        if points.of == Some((self.id, patch)) {
+        if points.of != Some((self.id, patch)) {
+            self.fetch(patch, points, false);
+        }
+    }
+
+    /// As [`load`](Self::load), with the heights of points.
+    pub fn load_with_heights(&self, patch: PatchId, points: &mut PatchPoints) {
+        if points.of == Some((self.id, patch)) && points.normal.is_some() {
             return;
         }
-        points.of = Some((self.id, patch));
+        self.fetch(patch, points, true);
+    }
+
+    fn fetch(&self, patch: PatchId, points: &mut PatchPoints, has_heights: bool) {
+        (points.of, points.normal) = (Some((self.id, patch)), has_heights.then_some([0; 3]));
         let (face, sub) = self.face_of(patch);
         let (first, size) = self.topology.face_corners(face.0);
         points.node = self.plan_of_face[face.idx()];
         if points.node == REGULAR {
             for (point, vertex) in points.control.iter_mut().zip(regular_ring(&self.topology, first)) {
                 *point = self.control_point(vertex);
+            }
+            if has_heights {
+                let corners = limit_corners(&points.control);
+                points.normal = Some(measure_heights(&mut points.control, corners));
             }
             return;
         }
@@ -294,6 +321,13 @@ impl Surface {
             let parent = &points.polygon;
             let ring = points.parts.new_ring();
             points.node = Evaluator::child_ring(&self.plans, points.node, parent, sub as usize, ring);
+        }
+        if has_heights {
+            // Before there are any parts.
+            let ring = points.parts.ring_mut();
+            // A face that meets itself may have fewer points.
+            let corners = ring.first_chunk().copied().unwrap_or([Point::ZERO; 4]);
+            points.normal = Some(measure_heights(ring, corners));
         }
         points.parts.begin(&self.plans, points.node);
     }
@@ -353,7 +387,8 @@ impl Surface {
         if sample.kind == SampleKind::PositionOnly { DVec3::ZERO } else { sample.du.cross(sample.dv) }
     }
 
-    /// A box in lattice units that holds part of a patch; see `Evaluator::parts_bounds`.
+    /// How far part of a patch reaches, in lattice units; see `Evaluator::parts_bounds`. Heights are right if they were
+    /// [loaded](Self::load_with_heights).
     pub fn bounds(
         &self,
         points: &mut PatchPoints,
@@ -361,11 +396,9 @@ impl Surface {
         u: [f64; 2],
         v: [f64; 2],
         depth: u32,
-    ) -> DBounds {
+    ) -> Extent {
         if points.node == REGULAR {
-            let mut bounds = DBounds::EMPTY;
-            evaluator.grow_by_hull(&mut bounds, &points.control, u, v);
-            bounds
+            evaluator.regular_extent(&points.control, u, v)
         } else if let Some(tree) = self.tree(points) {
             evaluator.edited_bounds(&self.plans, tree, u, v, depth)
         } else {
@@ -405,6 +438,24 @@ fn lattice_point(control: &[[f32; 3]], vertex: u32) -> Point {
 
 fn patch_of(faces_of_patches: Option<&FaceIndex>, face: FaceId, sub: u32) -> PatchId {
     PatchId(faces_of_patches.map_or(face.0, |index| index.corners(face.0).0) + sub)
+}
+
+/// 36 times the corners of a regular patch, counter-clockwise.
+fn limit_corners(control: &ControlPoints) -> [Point; 4] {
+    let along_v = |i: usize, j: usize| control[4 * j + i] + control[4 * j + 4 + i] * 4.0 + control[4 * j + 8 + i];
+    let corner = |i: usize, j: usize| along_v(i, j) + along_v(i + 1, j) * 4.0 + along_v(i + 2, j);
+    [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)]
+}
+
+/// Gives points their heights along the normal of the quad with these corners, in turn, and returns that.
+fn measure_heights(points: &mut [Point], corners: [Point; 4]) -> [i8; 3] {
+    let [a, b, c, d] = corners.map(Point::to_vec);
+    let normal = Plate::normal_along((c - a).cross(d - b));
+    let [x, y, z] = normal.map(f64::from);
+    for Point(p) in points {
+        p[3] = x * p[0] + y * p[1] + z * p[2];
+    }
+    normal
 }
 
 /// Where in a regular ring the vertices at corner `k` go: itself, then across its edge and on counter-clockwise.

@@ -64,6 +64,11 @@ impl Kernel for Avx2 {
         unsafe { _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(x.as_ptr().cast()))) }
     }
     #[inline(always)]
+    fn widen_signed(self, x: &[i8; 8]) -> __m256 {
+        // SAFETY: `self` proves AVX2; `x` is the 8 readable bytes that are loaded.
+        unsafe { _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64(x.as_ptr().cast()))) }
+    }
+    #[inline(always)]
     fn add(self, a: __m256, b: __m256) -> __m256 {
         in_registers!(_mm256_add_ps(a, b))
     }

@@ -46,6 +46,8 @@ pub trait Kernel: Copy + Send + Sync + 'static {
     fn store(self, x: Self::F) -> [f32; 8];
     /// Eight bytes as floats 0 to 255.
     fn widen(self, x: &[u8; 8]) -> Self::F;
+    /// Eight signed bytes as floats.
+    fn widen_signed(self, x: &[i8; 8]) -> Self::F;
     /// Lanewise sum.
     fn add(self, a: Self::F, b: Self::F) -> Self::F;
     /// Lanewise difference.

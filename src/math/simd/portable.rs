@@ -47,6 +47,10 @@ impl Kernel for Portable {
         x.map(f32::from)
     }
     #[inline(always)]
+    fn widen_signed(self, x: &[i8; 8]) -> [f32; 8] {
+        x.map(f32::from)
+    }
+    #[inline(always)]
     fn add(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
         zip(a, b, |a, b| a + b)
     }

@@ -17,7 +17,7 @@
 use super::collapse::{Collapse, Lane, parents_first};
 use super::groups::{Group, groups};
 use super::parts::divide;
-use super::{EMPTY, LANES, LEAF, NodeBoxes, Nodes, TopLevel};
+use super::{EMPTY, LANES, LEAF, NodeBoxes, Nodes, Plates, TopLevel};
 use crate::math::Bounds;
 use crate::parallel::for_each;
 use glam::{Vec3, Vec3A};
@@ -94,13 +94,14 @@ impl NodeBoxes {
 impl Nodes {
     /// Without nodes; growing to `n` copies nothing.
     fn with_capacity(n: usize) -> Self {
-        Self { boxes: Vec::with_capacity(n), refs: Vec::with_capacity(n) }
+        Self { boxes: Vec::with_capacity(n), refs: Vec::with_capacity(n), plates: Vec::with_capacity(n) }
     }
 
     /// Adds a node without children; returns its number.
     fn push(&mut self) -> usize {
         self.boxes.push(NodeBoxes::NOTHING);
         self.refs.push([EMPTY; LANES]);
+        self.plates.push(Plates::default());
         self.refs.len() - 1
     }
 
@@ -117,6 +118,7 @@ impl Nodes {
         let root = self.refs.len() as u32;
         let in_place = |r: u32| if r & LEAF == 0 { r + root } else { r };
         self.boxes.extend_from_slice(&tree.boxes);
+        self.plates.extend_from_slice(&tree.plates);
         self.refs.extend(tree.refs.iter().map(|refs| refs.map(in_place)));
         root
     }
@@ -274,5 +276,6 @@ fn emit(collapse: &Collapse<'_>, boxes: &[Bounds]) -> TopLevel {
     }
     nodes.boxes.shrink_to_fit();
     nodes.refs.shrink_to_fit();
+    nodes.plates.shrink_to_fit();
     TopLevel { nodes, stack_need: (LANES - 1) * deepest + 1 }
 }

@@ -30,6 +30,7 @@ mod front;
 mod groups;
 mod packet_walk;
 mod parts;
+mod plates;
 mod traverse;
 mod visit;
 
@@ -38,6 +39,7 @@ use crate::ids::PatchId;
 pub use build::BUILD_BYTES_PER_PATCH;
 pub use front::{Front, FrontWalk};
 pub use packet_walk::PacketWalk;
+use plates::Plates;
 pub use traverse::{AnyWalk, TraversalStack, Walk};
 
 /// A leaf of the tree.
@@ -79,13 +81,14 @@ const _: () = assert!(size_of::<NodeBoxes>() == 192);
 type Refs = [u32; LANES];
 
 /// Bytes of a node.
-pub const NODE_BYTES: usize = size_of::<NodeBoxes>() + size_of::<Refs>();
+pub const NODE_BYTES: usize = size_of::<NodeBoxes>() + size_of::<Refs>() + size_of::<Plates>();
 
-/// All nodes, in two lists of the same length.
+/// All nodes, in three lists of the same length.
 #[derive(Clone, Debug, Default)]
 struct Nodes {
     boxes: Vec<NodeBoxes>,
     refs: Vec<Refs>,
+    plates: Vec<Plates>,
 }
 
 /// The tree over a mesh's patches.

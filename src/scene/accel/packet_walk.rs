@@ -5,8 +5,8 @@
 //! them.
 
 use super::front::Group;
-use super::traverse::{OpenNode, TraversalStack};
-use super::{Front, LANES, LEAF, LeafRef, NodeBoxes, Refs, TopLevel};
+use super::traverse::{NodeLists, OpenNode, TraversalStack};
+use super::{Front, LANES, LEAF, LeafRef, NodeBoxes, TopLevel};
 use crate::grid::RayPacket;
 use crate::ids::PatchId;
 use crate::math::simd::Kernel;
@@ -36,7 +36,7 @@ pub struct PacketWalk<'t, K: Kernel> {
     rest: &'t [Group],
     /// Lanes of the group still to be visited.
     lanes: u32,
-    nodes: (&'t [NodeBoxes], &'t [Refs]),
+    nodes: NodeLists<'t>,
     /// Below a node of the front: the present node, and its lanes still to be visited.
     node: u32,
     order: K::O,
@@ -83,9 +83,9 @@ impl<K: Kernel> PacketWalk<'_, K> {
             }
             let lane = k.first(self.order).0;
             self.order = k.without(self.order, lane);
-            let rays = self.nodes.0[self.node as usize].meeting(k, packet, lane);
+            let rays = self.nodes.boxes[self.node as usize].meeting(k, packet, lane);
             if rays != 0 {
-                let reference = self.nodes.1[self.node as usize][lane % LANES];
+                let reference = self.nodes.refs[self.node as usize][lane % LANES];
                 return Some(Met { reference, slot: self.node * LANES as u32 + lane as u32, rays });
             }
         }
@@ -120,7 +120,7 @@ impl<K: Kernel> PacketWalk<'_, K> {
             self.stack[self.n] = OpenNode { order: k.store_order(self.order), node: self.node };
             self.n += 1;
         }
-        let (enter, leave) = self.nodes.0[node as usize].seen_by(k, packet);
+        let (enter, leave) = self.nodes.boxes[node as usize].seen_by(k, packet);
         (self.node, self.order) = (node, k.in_order(enter, leave));
     }
 }

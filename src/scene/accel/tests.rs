@@ -339,10 +339,10 @@ fn boxes_of_growing_size_make_a_tree_of_bounded_depth() {
 }
 
 #[test]
-fn a_tree_takes_less_than_66_bytes_a_patch() {
+fn a_tree_takes_less_than_78_bytes_a_patch() {
     let tree = TopLevel::build(&scattered(20_000, 1e5), 2);
     let per_patch = tree.bytes() as f64 / 20_000.0;
-    assert!(per_patch < 66.0, "{per_patch}");
+    assert!(per_patch < 78.0, "{per_patch}");
 }
 
 #[test]

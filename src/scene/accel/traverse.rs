@@ -1,5 +1,6 @@
 //! Rays through the wide tree.
 
+use super::plates::{Plates, Rise};
 use super::{LANES, LEAF, LeafRef, LeafWalk, NodeBoxes, Refs, TopLevel};
 use crate::grid::{LatticeRay, Plane};
 use crate::ids::PatchId;
@@ -38,9 +39,9 @@ impl TopLevel {
         ray: &'t LatticeRay,
         stack: &'t mut TraversalStack,
     ) -> Walk<'t, K> {
-        let (nodes, slabs) = (self.nodes(), Slabs::new(kernel, ray));
+        let (nodes, slabs, rise) = (self.nodes(), Slabs::new(kernel, ray), Rise::new(kernel, ray));
         let order = kernel.load_order(&[K::LAST; LANES]);
-        Walk { kernel, slabs, nodes, stack: stack.open_of_size(self.stack_need), n: 0, node: 0, order }
+        Walk { kernel, slabs, rise, nodes, stack: stack.open_of_size(self.stack_need), n: 0, node: 0, order }
     }
 
     /// A walk along a ray in any order, at its start.
@@ -53,8 +54,8 @@ impl TopLevel {
     ) -> AnyWalk<'t, K> {
         let stack = stack.nodes_of_size(self.stack_need + LANES);
         stack[0] = END;
-        let slabs = Slabs::new(kernel, ray);
-        AnyWalk { kernel, slabs, t_max: ray.t_max, nodes: self.nodes(), stack, n: 1, next: 0, node: 0, leaves: 0 }
+        let (slabs, rise, nodes) = (Slabs::new(kernel, ray), Rise::new(kernel, ray), self.nodes());
+        AnyWalk { kernel, slabs, rise, t_max: ray.t_max, nodes, stack, n: 1, next: 0, node: 0, leaves: 0 }
     }
 
     /// Calls `visit` for the patches whose boxes the ray meets, the nearest of each node first, until the rest lie
@@ -90,12 +91,20 @@ impl TopLevel {
         false
     }
 
-    /// The nodes, both lists cut to one length, so that one comparison checks both.
+    /// The nodes, all lists cut to one length, so that one comparison checks all.
     #[inline(always)]
-    pub(super) fn nodes(&self) -> (&[NodeBoxes], &[Refs]) {
+    pub(super) fn nodes(&self) -> NodeLists<'_> {
         let refs = &self.nodes.refs[..];
-        (&self.nodes.boxes[..refs.len()], refs)
+        NodeLists { boxes: &self.nodes.boxes[..refs.len()], refs, plates: &self.nodes.plates[..refs.len()] }
     }
+}
+
+/// What all nodes consist of.
+#[derive(Clone, Copy)]
+pub(super) struct NodeLists<'t> {
+    pub boxes: &'t [NodeBoxes],
+    pub refs: &'t [Refs],
+    plates: &'t [Plates],
 }
 
 /// A ray's way through the tree, from leaf to leaf.
@@ -109,7 +118,8 @@ impl TopLevel {
 pub struct Walk<'t, K: Kernel> {
     kernel: K,
     slabs: Slabs<K>,
-    nodes: (&'t [NodeBoxes], &'t [Refs]),
+    rise: Rise<K>,
+    nodes: NodeLists<'t>,
     /// Nodes above the present one that have lanes left.
     stack: &'t mut [OpenNode],
     /// How many.
@@ -123,14 +133,30 @@ impl<K: Kernel> Walk<'_, K> {
     #[inline(always)]
     pub(super) fn start_at(&mut self, node: u32, t_max: f32) {
         debug_assert!(self.n == 0);
-        (self.node, self.order) = (node, self.order_of(&self.nodes.0[node as usize], t_max));
+        (self.node, self.order) = (node, self.order_at(node, t_max));
     }
 
-    /// The lanes that the ray meets before `t_max`, in the order of entry.
+    /// The lanes of a node that the ray meets before `t_max`, in the order of entry; of leaves those whose plates it
+    /// meets, too.
+    #[inline(always)]
+    fn order_at(&self, node: u32, t_max: f32) -> K::O {
+        let (k, boxes) = (self.kernel, &self.nodes.boxes[node as usize]);
+        let (enter, leave) = self.slabs.test(k, boxes);
+        let leaves = leaves_among(k, &self.nodes.refs[node as usize]);
+        let mut end = k.min(leave, k.splat(t_max));
+        if k.le(enter, end) & leaves != 0 {
+            let distance = self.nodes.plates[node as usize].distance(k, boxes, &self.rise, enter, leave);
+            // What is not a number, in empty lanes, counts as zero.
+            end = k.mul_add(k.max(distance, k.splat(0.0)), k.splat(-FAR_BEFORE), end);
+        }
+        k.in_order(enter, end)
+    }
+
+    /// The boxes that the ray meets before `t_max`, in the order of entry.
     #[inline(always)]
     pub(super) fn order_of(&self, boxes: &NodeBoxes, t_max: f32) -> K::O {
-        let (enter, leave) = self.slabs.test(self.kernel, boxes, t_max);
-        self.kernel.in_order(enter, leave)
+        let (enter, leave) = self.slabs.test(self.kernel, boxes);
+        self.kernel.in_order(enter, self.kernel.min(leave, self.kernel.splat(t_max)))
     }
 }
 
@@ -150,7 +176,7 @@ impl<K: Kernel> LeafWalk for Walk<'_, K> {
                 continue;
             }
             self.order = k.without(self.order, lane);
-            let refs = &self.nodes.1[self.node as usize];
+            let refs = &self.nodes.refs[self.node as usize];
             let reference = refs[lane % LANES];
             if reference & LEAF != 0 {
                 let slot = self.node * LANES as u32 + lane as u32;
@@ -162,7 +188,7 @@ impl<K: Kernel> LeafWalk for Walk<'_, K> {
             }
             self.stack[self.n] = OpenNode { order: k.store_order(self.order), node: self.node };
             self.n += usize::from(k.has_any(self.order));
-            (self.node, self.order) = (reference, self.order_of(&self.nodes.0[reference as usize], t_max));
+            (self.node, self.order) = (reference, self.order_at(reference, t_max));
         }
     }
 }
@@ -178,8 +204,9 @@ impl<K: Kernel> LeafWalk for Walk<'_, K> {
 pub struct AnyWalk<'t, K: Kernel> {
     kernel: K,
     slabs: Slabs<K>,
+    rise: Rise<K>,
     t_max: f32,
-    nodes: (&'t [NodeBoxes], &'t [Refs]),
+    nodes: NodeLists<'t>,
     /// Inner nodes to be visited, above one [`END`].
     stack: &'t mut [u32],
     /// Entries on the stack.
@@ -190,6 +217,9 @@ pub struct AnyWalk<'t, K: Kernel> {
     node: u32,
     leaves: u32,
 }
+
+/// Times a difference of heights: before anything is entered.
+const FAR_BEFORE: f32 = 1e30;
 
 /// In place of a node: there are no more.
 const END: u32 = u32::MAX;
@@ -210,7 +240,7 @@ impl<K: Kernel> AnyWalk<'_, K> {
         if self.leaves != 0 {
             prefetch(slot - lane + self.leaves.trailing_zeros());
         }
-        let refs = &self.nodes.1[self.node as usize];
+        let refs = &self.nodes.refs[self.node as usize];
         Some(LeafRef { slot, patch: PatchId(refs[lane as usize] & !LEAF) })
     }
 
@@ -218,12 +248,15 @@ impl<K: Kernel> AnyWalk<'_, K> {
     #[inline(always)]
     fn visit(&mut self) {
         let k = self.kernel;
-        let (boxes, refs) = (&self.nodes.0[self.next as usize], &self.nodes.1[self.next as usize]);
-        let (enter, leave) = self.slabs.test(k, boxes, self.t_max);
-        let met = k.le(enter, leave);
-        let leaves = k.negative(k.load(bytemuck::cast_ref(refs)));
+        let (boxes, refs) = (&self.nodes.boxes[self.next as usize], &self.nodes.refs[self.next as usize]);
+        let (enter, leave) = self.slabs.test(k, boxes);
+        let (met, leaves) = (k.le(enter, k.min(leave, k.splat(self.t_max))), leaves_among(k, refs));
         let inner = met & !leaves;
         (self.node, self.leaves) = (self.next, met & leaves);
+        if self.leaves != 0 {
+            let plates = &self.nodes.plates[self.next as usize];
+            self.leaves &= k.le(plates.distance(k, boxes, &self.rise, enter, leave), k.splat(0.0));
+        }
         if inner == 0 {
             self.n -= 1;
             self.next = self.stack[self.n];
@@ -237,6 +270,12 @@ impl<K: Kernel> AnyWalk<'_, K> {
             self.n += others.count_ones() as usize;
         }
     }
+}
+
+/// The lanes that are leaves or empty, as bits.
+#[inline(always)]
+fn leaves_among<K: Kernel>(k: K, refs: &Refs) -> u32 {
+    k.negative(k.load(bytemuck::cast_ref(refs)))
 }
 
 /// What the tests of all nodes need of a ray: t of a plane p is `p * inv - origin * inv`. Made once: what stays in
@@ -265,11 +304,11 @@ impl<K: Kernel> Slabs<K> {
         }
     }
 
-    /// Where the ray enters a node's lanes, and where it leaves them, between 0 and `t_max`: it meets those that it
-    /// does not leave before it enters.
+    /// Where the ray enters a node's lanes, at 0 or later, and where it leaves them: it meets those that it does not
+    /// leave before it enters, nor enters behind its end.
     #[inline(always)]
-    fn test(&self, k: K, boxes: &NodeBoxes, t_max: f32) -> (K::F, K::F) {
-        let (mut enter, mut leave) = (k.splat(0.0), k.splat(t_max));
+    fn test(&self, k: K, boxes: &NodeBoxes) -> (K::F, K::F) {
+        let (mut enter, mut leave) = (k.splat(0.0), k.splat(f32::INFINITY));
         for axis in 0..3 {
             let near = k.mul_add(boxes.plane(k, self.near_planes[axis]), self.inv[axis], self.near[axis]);
             let far = k.mul_add(boxes.plane(k, self.far_planes[axis]), self.inv[axis], self.far[axis]);
@@ -281,7 +320,7 @@ impl<K: Kernel> Slabs<K> {
 
 /// x, y and z, each in all lanes.
 #[inline(always)]
-fn spread<K: Kernel>(k: K, x: K::F) -> [K::F; 3] {
+pub(super) fn spread<K: Kernel>(k: K, x: K::F) -> [K::F; 3] {
     [k.shuffle::<0b00_00_00_00>(x), k.shuffle::<0b01_01_01_01>(x), k.shuffle::<0b10_10_10_10>(x)]
 }
 

@@ -1,9 +1,10 @@
 //! Evaluating patches under edits: down the quadtree, then as any plan.
 
 use super::EditTree;
-use crate::math::{DBounds, PointGrid};
+use crate::math::PointGrid;
 use crate::subdiv::bounds::half_range;
 use crate::subdiv::eval::{Evaluator, LEFT_FIRST, SurfaceSample, Target, quarter, quarters_of};
+use crate::subdiv::extent::Extent;
 use crate::subdiv::plan::PlanLibrary;
 
 impl Evaluator {
@@ -64,11 +65,11 @@ impl Evaluator {
         u: [f64; 2],
         v: [f64; 2],
         depth: u32,
-    ) -> DBounds {
+    ) -> Extent {
         match tree {
             EditTree::Rest { node, ring } => self.bounds(library, *node, ring, u, v, depth),
             EditTree::Split(quarters) => {
-                let mut bounds = DBounds::EMPTY;
+                let mut bounds = Extent::EMPTY;
                 for (k, tree) in quarters.iter().enumerate() {
                     let (x, y) = quarter(k);
                     if let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) {

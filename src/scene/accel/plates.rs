@@ -1,0 +1,236 @@
+//! Plates of leaves: what a box alone cannot tell.
+//!
+//! The box of a patch that is neither small nor parallel to its sides is mostly empty, and most rays that meet it pass
+//! the patch by. A patch is a sheet, though: it lies in a **plate**, the space between two parallel planes, across its
+//! middle normal. A ray whose way through the box is all above the plate, or all below, does not meet the patch; nothing
+//! is looked up or built for it then.
+//!
+//! A node keeps the plates of its leaves in 44 bytes, as **heights** along the normals above the middles of their boxes.
+//! Heights of the ray where it enters and leaves a box are compared with those: what lies between is between.
+//!
+//! # Why no plate hides a triangle that would be hit
+//! Write u = 2^-24, and N for the sum of a normal's components, at most 381. [`LatticeRay`] has the rest of the words,
+//! and shows that a hit of a triangle has a point P of it, in its plate, which is within 8 u `reach` along each axis of
+//! the point of the ray at P's depth t; and that t lies between where the ray is said to enter the box and to leave it.
+//! So the height of the ray at t is within 8 N u `reach` of the plate. Between two ends heights lie between those of the
+//! ends, and these are computed with errors of
+//!
+//! * 5 N u `reach` for that of the origin above the middle of the box: half a step and rounding to f32 of the origin,
+//!   one step of the middle, the rounding of their difference, of products and of sums,
+//! * 5 N u `reach` for the slope, whose direction has been rounded twice, times t,
+//! * 2 N u `reach` for their sum,
+//!
+//! 20 N u `reach` in all. Plates are thickened by 40 N u `reach` on either side when they are put into nodes, with the
+//! longest `reach` there is, 3 times 2^24: 120 N, some 120 to 210 lattice steps. All other rounding is outwards.
+//!
+//! Where the ray ends does not matter: of a triangle that is nearly a line the distance is not known well, and t may lie
+//! behind a hit of another one that is said to be farther.
+
+use super::traverse::spread;
+use super::{EMPTY, LANES, LEAF, NodeBoxes, Nodes, Refs, TopLevel};
+use crate::grid::LatticeRay;
+use crate::math::Plate;
+use crate::math::simd::Kernel;
+use crate::parallel::for_each;
+use glam::DVec3;
+use parking_lot::Mutex;
+
+/// Nodes that a thread gives their plates before it asks for more.
+const NODES_PER_TASK: usize = 4096;
+
+/// By how much plates grow on either side, in lattice steps times the sum of a normal's components.
+const MARGIN: f64 = 120.0;
+
+/// The plates of a node's leaves, as they are seen from the middles of their boxes. Other lanes have one that is all of
+/// space.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub(super) struct Plates {
+    /// x, y and z of normals.
+    normals: [[i8; LANES]; 3],
+    /// The heights of their middles, in units.
+    middles: [i8; LANES],
+    /// Half of their thickness.
+    halves: [u8; LANES],
+    unit: f32,
+}
+
+const _: () = assert!(size_of::<Plates>() == 44);
+
+/// What plates need of a ray.
+pub(super) struct Rise<K: Kernel> {
+    origin: [K::F; 3],
+    direction: [K::F; 3],
+}
+
+impl<K: Kernel> Rise<K> {
+    #[inline(always)]
+    pub fn new(k: K, ray: &LatticeRay) -> Self {
+        let direction = k.div(k.splat(1.0), k.load(&ray.inv));
+        Self { origin: spread(k, k.floats_twice(&ray.cell)), direction: spread(k, direction) }
+    }
+}
+
+/// A plate as seen from the middle of its leaf's box.
+struct Seen {
+    lane: usize,
+    normal: [i8; 3],
+    middle: f64,
+    half: f64,
+}
+
+impl Seen {
+    fn new(lane: usize, plate: &Plate, boxes: &NodeBoxes) -> Self {
+        let sums = [0, 1, 2].map(|axis| f64::from(boxes.planes[axis][lane]) + f64::from(boxes.planes[axis + 3][lane]));
+        let from = Plate::height(plate.normal, 0.5 * DVec3::from_array(sums));
+        let [low, high] = [plate.low, plate.high].map(|height| f64::from(height) - from);
+        let margin = MARGIN * plate.normal.iter().map(|x| f64::from(*x).abs()).sum::<f64>();
+        Self { lane, normal: plate.normal, middle: 0.5 * (low + high), half: 0.5 * (high - low) + margin }
+    }
+}
+
+impl Plates {
+    /// Those of the leaves among a node's lanes.
+    fn of(boxes: &NodeBoxes, refs: &Refs, plates: &[Plate]) -> Self {
+        let leaves = refs.iter().enumerate().filter(|(_, r)| **r != EMPTY && **r & LEAF != 0);
+        let seen = leaves.map(|(lane, r)| Seen::new(lane, &plates[(r & !LEAF) as usize], boxes));
+        let units = seen.clone().map(|of| (of.middle.abs() / 127.0).max(of.half / 254.0));
+        let unit = (units.fold(0.0, f64::max) as f32).next_up();
+        let mut out = Self { unit, ..Self::default() };
+        for Seen { lane, normal, middle, half } in seen {
+            let middle = middle / f64::from(unit);
+            out.middles[lane] = middle.round() as i8;
+            out.halves[lane] = (half / f64::from(unit) + (middle - middle.round()).abs()).ceil() as u8;
+            (0..3).for_each(|axis| out.normals[axis][lane] = normal[axis]);
+        }
+        out
+    }
+
+    /// How far beyond its plate a ray stays that enters and leaves the node's boxes there, lane by lane: zero or less if
+    /// it meets the plate.
+    #[inline(always)]
+    pub fn distance<K: Kernel>(&self, k: K, boxes: &NodeBoxes, ray: &Rise<K>, enter: K::F, leave: K::F) -> K::F {
+        let unit = k.splat(self.unit);
+        let mut start = k.mul(k.widen_signed(&self.middles), k.sub(k.splat(-0.0), unit));
+        let mut slope = k.splat(0.0);
+        for axis in 0..3 {
+            let normal = k.widen_signed(&self.normals[axis]);
+            let twice_middle = k.add(k.load(&boxes.planes[axis]), k.load(&boxes.planes[axis + 3]));
+            let from_middle = k.mul_add(twice_middle, k.splat(-0.5), ray.origin[axis]);
+            start = k.mul_add(normal, from_middle, start);
+            slope = k.mul_add(normal, ray.direction[axis], slope);
+        }
+        let (first, last) = (k.mul_add(enter, slope, start), k.mul_add(leave, slope, start));
+        let (above, below) = (k.min(first, last), k.sub(k.splat(-0.0), k.max(first, last)));
+        k.sub(k.max(above, below), k.mul(k.widen(&self.halves), unit))
+    }
+}
+
+impl TopLevel {
+    /// Gives the leaves their plates, in lattice units: that of each patch holds every lattice vertex of it.
+    pub fn with_plates(mut self, plates: &[Plate], n_threads: usize) -> Self {
+        let Nodes { boxes, refs, plates: of_nodes } = &mut self.nodes;
+        let nodes = of_nodes.chunks_mut(NODES_PER_TASK).enumerate().map(|(i, of_nodes)| (i * NODES_PER_TASK, of_nodes));
+        let tasks: Vec<_> = nodes.map(Mutex::new).collect();
+        for_each(&tasks, n_threads, |_, task| {
+            let (first, of_nodes) = &mut *task.lock();
+            for (node, of_node) in (*first..).zip(of_nodes.iter_mut()) {
+                *of_node = Plates::of(&boxes[node], &refs[node], plates);
+            }
+        });
+        drop(tasks);
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::TriangleId;
+    use crate::ids::PatchId;
+    use crate::math::Bounds;
+    use crate::math::simd::{Portable, Task, run};
+    use crate::scene::accel::{LeafWalk, TraversalStack};
+
+    fn random(n: u64) -> f64 {
+        let z = (n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let z = (z ^ (z >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        ((z ^ (z >> 32)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Each coordinate up to `r` from zero.
+    fn random_point(n: u64, r: f64) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|k| r * (2.0 * random(3 * n + k) - 1.0)))
+    }
+
+    /// A quad that is somewhat bent: its corners, its box and its plate.
+    fn sheet(n: u64, size: f64) -> ([DVec3; 4], Bounds, Plate) {
+        let (p, u, v) = (random_point(4 * n, 6e6), random_point(4 * n + 1, size), random_point(4 * n + 2, size));
+        let corners = [p, p + u, p + u + v + random_point(4 * n + 3, 0.05 * size), p + v].map(DVec3::round);
+        let normal = Plate::normal_along(u.cross(v));
+        let heights = corners.map(|p| Plate::height(normal, p));
+        let [low, high] = [heights.into_iter().fold(f64::MAX, f64::min), heights.into_iter().fold(f64::MIN, f64::max)];
+        (corners, corners.iter().map(|p| p.as_vec3()).collect(), Plate::around(normal, low, high))
+    }
+
+    /// Patches that a ray visits on its way to the nearest hit, and to any.
+    struct Visits<'a>(&'a TopLevel, &'a LatticeRay);
+
+    impl Task for Visits<'_> {
+        type Output = [Vec<PatchId>; 2];
+        #[inline(always)]
+        fn run<K: Kernel>(self, k: K) -> Self::Output {
+            let mut stacks = [TraversalStack::default(), TraversalStack::default()];
+            let [of_closest, of_any] = &mut stacks;
+            let mut closest = self.0.walk(k, self.1, of_closest);
+            let mut any = self.0.walk_any(k, self.1, of_any);
+            let patch = |leaf: crate::scene::accel::LeafRef| leaf.patch;
+            [
+                std::iter::from_fn(|| closest.nearest(self.1.t_max, |_| ())).map(patch).collect(),
+                std::iter::from_fn(|| any.next(|_| ())).map(patch).collect(),
+            ]
+        }
+    }
+
+    /// Rays that hit a sheet visit it, from wherever they come; of those that only meet its box few do.
+    #[test]
+    fn plates_hide_no_sheet_that_a_ray_hits_and_most_of_those_that_it_passes() {
+        // Besides the sheet that is hit.
+        let (mut n_visited, mut n_without) = (0, 0);
+        for (i, size) in [40.0, 3e3, 1e5, 1.5e6].into_iter().enumerate() {
+            let n = 500;
+            let sheets: Vec<_> = (0..n).map(|k| sheet(k + 1000 * i as u64, size)).collect();
+            let boxes: Vec<Bounds> = sheets.iter().map(|s| s.1).collect();
+            let plates: Vec<Plate> = sheets.iter().map(|s| s.2).collect();
+            let (without, tree) = (TopLevel::build(&boxes, 1), TopLevel::build(&boxes, 2).with_plates(&plates, 2));
+            for k in 0..3000 {
+                let (corners, ..) = sheets[k as usize % sheets.len()];
+                let [u, v] = [random(7 * k), random(7 * k + 1)];
+                // On one of the triangles; seen from its border, from near, from far or from within its plane.
+                let [a, b, c] = if u > v { [0, 1, 2] } else { [0, 2, 3] }.map(|c| corners[c]);
+                let (x, y) = if u > v { (u - v, v) } else { (u, v - u) };
+                let target = a + x * (b - a) + y * (c - a);
+                let direction = match k % 4 {
+                    0 => b - a + random_point(k, 1e-3 * size),
+                    1 => [DVec3::X, -DVec3::Y, DVec3::Z][k as usize % 3],
+                    _ => random_point(k, 1.0),
+                };
+                let back = [0.0, 1e-2, 3.0, 300.0][k as usize / 4 % 4] * size / direction.length();
+                let mut ray = LatticeRay::new(target - back * direction, direction, f32::INFINITY, TriangleId::NONE);
+                if k % 3 == 0 {
+                    // It ends where it hits.
+                    ray = LatticeRay::new(target - back * direction, direction, back as f32, TriangleId::NONE);
+                }
+                for visits in [run(Visits(&tree, &ray)), Visits(&tree, &ray).run(Portable)] {
+                    for visited in visits {
+                        let patch = PatchId(k as u32 % sheets.len() as u32);
+                        assert!(visited.contains(&patch), "ray {k} at {size}: {visited:?} without {patch:?}");
+                        n_visited += visited.len() - 1;
+                    }
+                }
+                n_without += 2 * run(Visits(&without, &ray)).iter().map(|visited| visited.len() - 1).sum::<usize>();
+            }
+        }
+        assert!(10 * n_visited < 6 * n_without, "{n_visited} of {n_without} are visited");
+    }
+}
