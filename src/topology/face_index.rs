@@ -1,5 +1,8 @@
-//! From what faces are numbered by in turn, half-edges or patches, to the face and back: in a quarter of a byte each
-//! for mixed polygons, and none for quads.
+//! From what faces are numbered by in turn, half-edges or patches, to the face and back: in a quarter of a byte each,
+//! and half a byte a face, for mixed polygons, and none for quads.
+
+/// Of so many faces where the first one starts is written down.
+const FACES_PER_MARK: u32 = 8;
 
 /// Where each face's half-edges start, or its patches.
 #[derive(Debug)]
@@ -11,8 +14,12 @@ pub enum FaceIndex {
     },
     /// Faces of any size.
     Mixed {
-        /// First half-edge of each face, and the total at the end.
-        start: Vec<u32>,
+        /// Number of faces.
+        n_faces: u32,
+        /// Number of half-edges.
+        n_things: u32,
+        /// First half-edge of every [`FACES_PER_MARK`]th face.
+        marks: Vec<u32>,
         /// A bit per half-edge, set where a face starts, and one more at the end.
         is_start: Vec<u64>,
         /// Number of set bits before each word of `is_start`.
@@ -31,17 +38,17 @@ impl FaceIndex {
 
     /// An index for faces that have as many things each, at least one, and fewer than 2^32 together.
     pub fn mixed(sizes: impl ExactSizeIterator<Item = u32>) -> Self {
-        let mut start = Vec::with_capacity(sizes.len() + 1);
-        let mut total = 0;
-        for n in sizes {
-            start.push(total);
+        let (n_faces, mut marks) = (sizes.len() as u32, Vec::new());
+        let (mut is_start, mut total) = (vec![1u64], 0);
+        for (face, n) in (0..n_faces).zip(sizes) {
+            if face % FACES_PER_MARK == 0 {
+                marks.push(total);
+            }
             total += n;
+            is_start.resize(total as usize / 64 + 1, 0);
+            is_start[total as usize / 64] |= 1 << (total % 64);
         }
-        let mut is_start = vec![0u64; total as usize / 64 + 1];
-        start.push(total);
-        for &s in &start {
-            is_start[s as usize / 64] |= 1 << (s % 64);
-        }
+        is_start.shrink_to_fit();
         let mut before = 0;
         let rank = is_start
             .iter()
@@ -50,14 +57,13 @@ impl FaceIndex {
                 before - w.count_ones()
             })
             .collect();
-        FaceIndex::Mixed { start, is_start, rank }
+        FaceIndex::Mixed { n_faces, n_things: total, marks, is_start, rank }
     }
 
     /// Number of faces.
     pub fn n_faces(&self) -> usize {
         match self {
-            FaceIndex::Quads { n_faces } => *n_faces as usize,
-            FaceIndex::Mixed { start, .. } => start.len() - 1,
+            FaceIndex::Quads { n_faces } | FaceIndex::Mixed { n_faces, .. } => *n_faces as usize,
         }
     }
 
@@ -65,7 +71,7 @@ impl FaceIndex {
     pub fn n_things(&self) -> usize {
         match self {
             FaceIndex::Quads { n_faces } => 4 * *n_faces as usize,
-            FaceIndex::Mixed { start, .. } => start[start.len() - 1] as usize,
+            FaceIndex::Mixed { n_things, .. } => *n_things as usize,
         }
     }
 
@@ -102,6 +108,20 @@ impl FaceIndex {
             word += 1;
             starts = is_start[word];
         }
+        64 * word as u32 + starts.trailing_zeros()
+    }
+
+    /// Where the face starts that comes so many faces after the one that starts at `h`.
+    #[inline(always)]
+    fn start_after(is_start: &[u64], h: u32, mut n_faces: u32) -> u32 {
+        let mut word = h as usize / 64;
+        let mut starts = is_start[word] & (u64::MAX << (h % 64));
+        while starts.count_ones() <= n_faces {
+            n_faces -= starts.count_ones();
+            word += 1;
+            starts = is_start[word];
+        }
+        (0..n_faces).for_each(|_| starts &= starts - 1);
         64 * word as u32 + starts.trailing_zeros()
     }
 
@@ -147,9 +167,10 @@ impl FaceIndex {
     pub fn corners(&self, face: u32) -> (u32, u32) {
         match self {
             FaceIndex::Quads { .. } => (4 * face, 4),
-            FaceIndex::Mixed { start, .. } => {
-                let s = start[face as usize];
-                (s, start[face as usize + 1] - s)
+            FaceIndex::Mixed { marks, is_start, .. } => {
+                let mark = marks[(face / FACES_PER_MARK) as usize];
+                let first = Self::start_after(is_start, mark, face % FACES_PER_MARK);
+                (first, Self::start_from(is_start, first + 1) - first)
             }
         }
     }
@@ -158,7 +179,7 @@ impl FaceIndex {
     pub fn bytes(&self) -> usize {
         match self {
             FaceIndex::Quads { .. } => 0,
-            FaceIndex::Mixed { start, is_start, rank } => 4 * start.len() + 8 * is_start.len() + 4 * rank.len(),
+            FaceIndex::Mixed { marks, is_start, rank, .. } => 4 * marks.len() + 8 * is_start.len() + 4 * rank.len(),
         }
     }
 }
