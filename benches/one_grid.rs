@@ -6,7 +6,7 @@ use divan::{Bencher, black_box};
 use glam::DVec3;
 use lazytess::grid::{CellRect, NODE_BYTES, PieceLayout, encode_node};
 use lazytess::ids::{PatchId, VertexId};
-use lazytess::math::{Bounds, LatticeGrid};
+use lazytess::math::{Envelope, LatticeGrid};
 use lazytess::mesh::{ControlMesh, Crease, shapes};
 use lazytess::subdiv::{Dicer, PatchRates, Surface};
 
@@ -69,7 +69,7 @@ const RATE: u32 = 16;
 struct Builder {
     dicer: Dicer,
     vertices: LatticeGrid,
-    boxes: Vec<Bounds>,
+    envelopes: Vec<Envelope>,
     block: Vec<u64>,
 }
 
@@ -80,10 +80,11 @@ impl Builder {
 
     /// The node over a patch.
     fn node(&mut self, surface: &Surface, patch: PatchId, rates: &PatchRates) {
-        self.boxes.clear();
-        assert!(self.dicer.bounds_of_parts(surface, patch, rates, [0, 0], [2, 2], PIECE, 4, &mut self.boxes));
+        self.envelopes.clear();
+        let (part, out) = ([2, 2], &mut self.envelopes);
+        assert!(self.dicer.envelopes_of_parts(surface, patch, rates, [0, 0], part, PIECE, 4, out));
         let cells = CellRect { i0: 0, j0: 0, i1: RATE as u16, j1: RATE as u16 };
-        encode_node(cells, [2, 2], &self.boxes, &mut bytemuck::cast_slice_mut(&mut self.block)[..NODE_BYTES]);
+        encode_node(cells, [2, 2], &self.envelopes, &mut bytemuck::cast_slice_mut(&mut self.block)[..NODE_BYTES]);
         black_box(&self.block);
     }
 

@@ -152,13 +152,14 @@ impl Head {
     pub fn test<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> LaneHits {
         let mut t_near = [0.0; 16];
         let slabs = Slabs::new(kernel, self, ray);
-        let (low, low_t) = slabs.test(kernel, self.half_of_planes(0), t_max);
-        t_near[..8].copy_from_slice(&kernel.store(low_t));
-        let mut mask = low;
+        let end = kernel.splat(t_max);
+        let (enter, leave) = slabs.test(kernel, self.half_of_planes(0));
+        t_near[..8].copy_from_slice(&kernel.store(enter));
+        let mut mask = kernel.le(enter, kernel.min(leave, end));
         if self.has_high_lanes() {
-            let (high, high_t) = slabs.test(kernel, self.half_of_planes(1), t_max);
-            t_near[8..].copy_from_slice(&kernel.store(high_t));
-            mask |= high << 8;
+            let (enter, leave) = slabs.test(kernel, self.half_of_planes(1));
+            t_near[8..].copy_from_slice(&kernel.store(enter));
+            mask |= kernel.le(enter, kernel.min(leave, end)) << 8;
         }
         LaneHits { mask: mask & u32::from(self.mask), t_near }
     }
@@ -167,9 +168,12 @@ impl Head {
     #[inline(always)]
     pub fn lanes_met<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> u32 {
         let slabs = Slabs::new(kernel, self, ray);
-        let mut mask = slabs.test(kernel, self.half_of_planes(0), t_max).0;
+        let end = kernel.splat(t_max);
+        let (enter, leave) = slabs.test(kernel, self.half_of_planes(0));
+        let mut mask = kernel.le(enter, kernel.min(leave, end));
         if self.has_high_lanes() {
-            mask |= slabs.test(kernel, self.half_of_planes(1), t_max).0 << 8;
+            let (enter, leave) = slabs.test(kernel, self.half_of_planes(1));
+            mask |= kernel.le(enter, kernel.min(leave, end)) << 8;
         }
         mask & u32::from(self.mask)
     }
@@ -196,7 +200,7 @@ impl Head {
 
 /// What a ray makes of a head: t of plane q of axis k is `q * step[k] + near[k]` (or `far`), see [`LatticeRay`]. Each
 /// for x, y, z and one to spare, twice.
-struct Slabs<K: Kernel> {
+pub(super) struct Slabs<K: Kernel> {
     step: K::F,
     near: K::F,
     far: K::F,
@@ -211,7 +215,7 @@ pub(super) const ALL_Z: i32 = 0b10_10_10_10;
 
 impl<K: Kernel> Slabs<K> {
     #[inline(always)]
-    fn new(k: K, head: &Head, ray: &LatticeRay) -> Self {
+    pub fn new(k: K, head: &Head, ray: &LatticeRay) -> Self {
         let frame = head.frame();
         let base = k.floats_twice(frame);
         let inv = k.load(&ray.inv);
@@ -224,17 +228,17 @@ impl<K: Kernel> Slabs<K> {
         }
     }
 
-    /// The test of eight lanes: their bits, and where the ray enters.
+    /// Where the ray enters eight lanes, at 0 or later, and where it leaves them.
     #[inline(always)]
-    fn test(&self, k: K, planes: &[[u8; 4]; 22], t_max: f32) -> (u32, K::F) {
+    pub fn test(&self, k: K, planes: &[[u8; 4]; 22]) -> (K::F, K::F) {
         let ([near_x, near_y, near_z], [far_x, far_y, far_z]) = (self.near_planes, self.far_planes);
         let mut enter = k.max(self.plane_t::<ALL_X>(k, planes, near_x, self.near), k.splat(0.0));
         enter = k.max(self.plane_t::<ALL_Y>(k, planes, near_y, self.near), enter);
         enter = k.max(self.plane_t::<ALL_Z>(k, planes, near_z, self.near), enter);
-        let mut leave = k.min(self.plane_t::<ALL_X>(k, planes, far_x, self.far), k.splat(t_max));
+        let mut leave = self.plane_t::<ALL_X>(k, planes, far_x, self.far);
         leave = k.min(self.plane_t::<ALL_Y>(k, planes, far_y, self.far), leave);
         leave = k.min(self.plane_t::<ALL_Z>(k, planes, far_z, self.far), leave);
-        (k.le(enter, leave), enter)
+        (enter, leave)
     }
 
     /// t of one plane of eight lanes.

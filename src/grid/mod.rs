@@ -33,6 +33,7 @@
 //! `horizon/` spares rays the surface that they leave, `skyline/` all the rest.
 
 mod boxes;
+mod child_plates;
 mod frame;
 mod hit;
 mod horizon;
@@ -48,7 +49,7 @@ pub use boxes::{CellRect, HEAD_BYTES, LaneHits, lane_mask};
 pub use hit::{LatticeHit, TriangleId};
 pub use horizon::{Borders, Horizon};
 pub use node::{NODE_BYTES, NodeView, encode_node, is_node};
-pub use packet::{PACKET, RayPacket, SeenBoxes};
+pub use packet::{PACKET, RayPacket, SeenBoxes, SeenPlate};
 use piece::leaves_below;
 pub use piece::{MAX_CELLS, MOST_PIECE_BYTES, PieceLayout, PieceView, VertexFormat};
 pub use ray::{LATTICE_LIMIT, LatticeRay, Plane};

@@ -1,29 +1,30 @@
-//! The node: boxes around up to 4x4 children of a patch's tree of pieces.
+//! The node: boxes around up to 4x4 children of a patch's tree of pieces, and plates.
 
-use super::boxes::{CellRect, HEAD_BYTES, Head, IntegerBox, LaneBoxes, LaneHits, lane_mask, union};
-use super::{LATTICE_LIMIT, LatticeRay};
-use crate::math::Bounds;
+use super::boxes::{CellRect, Head, IntegerBox, LaneBoxes, LaneHits, Slabs, lane_mask, union};
+use super::child_plates::{ChildPlates, Rise};
+use super::{HEAD_BYTES, LATTICE_LIMIT, LatticeRay};
 use crate::math::simd::{self, Kernel, Task};
+use crate::math::{Bounds, Envelope};
 use glam::Vec3;
 
 /// Exact size of a node, without the words that the cache puts before it.
-pub const NODE_BYTES: usize = HEAD_BYTES;
+pub const NODE_BYTES: usize = HEAD_BYTES + size_of::<ChildPlates>();
 
 /// In place of a vertex format: a node has no vertices.
 const NO_FORMAT: u8 = 0;
 
-/// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `bounds` has one
-/// box in lattice units for each, u fastest; it must hold every lattice vertex of the child. A child with an empty box
-/// is never met; one at least is not empty. `out` is [`NODE_BYTES`] long.
+/// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `envelopes` has one
+/// in lattice units for each, u fastest; it must hold every lattice vertex of the child, and the normals of all plates
+/// must be the same. A child with an empty box is never met; one at least is not empty. `out` is [`NODE_BYTES`] long.
 #[inline]
-pub fn encode_node(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &mut [u8]) {
-    simd::run(EncodeNode { cells, children, bounds, out });
+pub fn encode_node(cells: CellRect, children: [u8; 2], envelopes: &[Envelope], out: &mut [u8]) {
+    simd::run(EncodeNode { cells, children, envelopes, out });
 }
 
 struct EncodeNode<'a> {
     cells: CellRect,
     children: [u8; 2],
-    bounds: &'a [Bounds],
+    envelopes: &'a [Envelope],
     out: &'a mut [u8],
 }
 
@@ -31,32 +32,35 @@ impl Task for EncodeNode<'_> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, _: K) {
-        let Self { cells, children, bounds, out } = self;
-        encode(cells, children, bounds, out);
+        let Self { cells, children, envelopes, out } = self;
+        encode(cells, children, envelopes, out);
     }
 }
 
 #[inline(always)]
-fn encode(cells: CellRect, children: [u8; 2], bounds: &[Bounds], out: &mut [u8]) {
+fn encode(cells: CellRect, children: [u8; 2], envelopes: &[Envelope], out: &mut [u8]) {
     debug_assert!(children.iter().all(|n| (1..=4).contains(n)));
     let [n_u, n_v] = children.map(usize::from);
-    assert_eq!(bounds.len(), n_u * n_v, "one box for each child");
+    assert_eq!(envelopes.len(), n_u * n_v, "one for each child");
     let children_and_lanes = || {
-        bounds
+        envelopes
             .chunks_exact(n_u)
             .enumerate()
             .flat_map(|(b, row)| row.iter().enumerate().map(move |(a, of)| (of, 4 * b + a)))
     };
     let (mut whole, mut boxes) = ([[i32::MAX; 3], [i32::MIN; 3]], LaneBoxes::UNSET);
-    for (of, lane) in children_and_lanes().filter(|(of, _)| !of.is_empty()) {
-        let child = integer_box(of);
+    for (of, lane) in children_and_lanes().filter(|(of, _)| !of.bounds.is_empty()) {
+        let child = integer_box(&of.bounds);
         boxes.set(lane, child);
         whole = union(whole, child);
     }
     assert!(whole[0][0] <= whole[1][0], "a node has children");
-    let head: &mut Head = bytemuck::from_bytes_mut(out);
+    let (head, plates) = out.split_at_mut(HEAD_BYTES);
+    let head: &mut Head = bytemuck::from_bytes_mut(head);
     head.set(whole, &boxes, children, cells, [0; 2], NO_FORMAT);
-    children_and_lanes().filter(|(of, _)| of.is_empty()).for_each(|(_, lane)| head.turn_inside_out(lane));
+    children_and_lanes().filter(|(of, _)| of.bounds.is_empty()).for_each(|(_, lane)| head.turn_inside_out(lane));
+    let plates_and_lanes = children_and_lanes().map(|(of, lane)| (&of.plate, lane));
+    bytemuck::from_bytes_mut::<ChildPlates>(plates).set(whole[0], plates_and_lanes);
 }
 
 /// The box rounded outwards to lattice points, and cut to the cube that vertices lie in.
@@ -69,20 +73,22 @@ fn integer_box(b: &Bounds) -> IntegerBox {
 /// Whether a block is a node; else it is a piece. The block is as for [`NodeView::new`].
 #[inline(always)]
 pub fn is_node(block: &[u8]) -> bool {
-    NodeView::new(block).head.format == NO_FORMAT
+    bytemuck::from_bytes::<Head>(&block[..HEAD_BYTES]).format == NO_FORMAT
 }
 
 /// A node to be read.
 #[derive(Clone, Copy, Debug)]
 pub struct NodeView<'b> {
     pub(super) head: &'b Head,
+    pub(super) plates: &'b ChildPlates,
 }
 
 impl<'b> NodeView<'b> {
     /// The node at the start of `bytes`, which must be aligned to 4 bytes at least (64 is best).
     #[inline(always)]
     pub fn new(bytes: &'b [u8]) -> Self {
-        Self { head: bytemuck::from_bytes(&bytes[..NODE_BYTES]) }
+        let (head, plates) = bytes[..NODE_BYTES].split_at(HEAD_BYTES);
+        Self { head: bytemuck::from_bytes(head), plates: bytemuck::from_bytes(plates) }
     }
 
     /// The cells that the node covers.
@@ -103,15 +109,52 @@ impl<'b> NodeView<'b> {
         lane_mask(self.head.lanes)
     }
 
-    /// The children whose boxes the ray meets before `t_max`. Child (a, b) is lane 4 b + a.
+    /// The children whose boxes the ray meets before `t_max`, and whose plates it meets within the boxes. Child (a, b) is
+    /// lane 4 b + a.
     #[inline(always)]
     pub fn test<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> LaneHits {
-        self.head.test(kernel, ray, t_max)
+        let mut t_near = [0.0; 16];
+        let through = Through::new(kernel, self, ray, t_max);
+        let (mut mask, enter) = self.test_half(kernel, &through, 0);
+        t_near[..8].copy_from_slice(&kernel.store(enter));
+        if self.head.has_high_lanes() {
+            let (high, enter) = self.test_half(kernel, &through, 1);
+            t_near[8..].copy_from_slice(&kernel.store(enter));
+            mask |= high << 8;
+        }
+        LaneHits { mask: mask & u32::from(self.head.mask), t_near }
     }
 
     /// The same, as bits, where the order does not matter.
     #[inline(always)]
     pub fn lanes_met<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> u32 {
-        self.head.lanes_met(kernel, ray, t_max)
+        let through = Through::new(kernel, self, ray, t_max);
+        let mut mask = self.test_half(kernel, &through, 0).0;
+        if self.head.has_high_lanes() {
+            mask |= self.test_half(kernel, &through, 1).0 << 8;
+        }
+        mask & u32::from(self.head.mask)
+    }
+
+    /// The test of lanes 0 to 7 or 8 to 15: their bits, and where the ray enters the boxes.
+    #[inline(always)]
+    fn test_half<K: Kernel>(&self, k: K, through: &Through<K>, half: usize) -> (u32, K::F) {
+        let (enter, leave) = through.slabs.test(k, self.head.half_of_planes(half));
+        let boxes = k.le(enter, k.min(leave, k.splat(through.t_max)));
+        (boxes & self.plates.met(k, half, &through.rise, enter, leave), enter)
+    }
+}
+
+/// What a ray makes of a node.
+struct Through<K: Kernel> {
+    slabs: Slabs<K>,
+    rise: Rise<K>,
+    t_max: f32,
+}
+
+impl<K: Kernel> Through<K> {
+    #[inline(always)]
+    fn new(k: K, node: &NodeView<'_>, ray: &LatticeRay, t_max: f32) -> Self {
+        Self { slabs: Slabs::new(k, node.head, ray), rise: node.plates.rise(k, node.head, ray), t_max }
     }
 }

@@ -162,6 +162,8 @@ pub struct LatticeRay {
     pub(crate) far_origin: Twice,
     /// 1 / direction, finite.
     pub(crate) inv: Twice,
+    /// The direction, components that count as zero too.
+    pub(crate) towards: Twice,
     /// The origin relative to `cell`, within half a step: so rays that start on the surface start where they should.
     pub(crate) fraction: Twice,
     /// The lattice point nearest to the origin, and one number to spare; |coordinate| <= 2^25.
@@ -227,6 +229,7 @@ impl LatticeRay {
             near_origin: k.store(k.add(origin, forward)),
             far_origin: k.store(k.sub(origin, forward)),
             inv: inverses,
+            towards: d,
             fraction: k.store(k.floats_of(k.sub4(start, whole))),
             cell: k.nearest4(whole),
             sides,

@@ -9,6 +9,6 @@ pub mod simd;
 
 pub use bounds::{Bounds, DBounds};
 pub use lattice_grid::{LatticeGrid, Rounding, WINDOW};
-pub use plate::Plate;
+pub use plate::{Envelope, Plate};
 pub use point_grid::PointGrid;
 pub use ray::{Hit, Intersect, OnTriangle, PrimitiveRef, Ray, RayBounds};

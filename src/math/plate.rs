@@ -1,6 +1,10 @@
 //! The space between two parallel planes.
 
+use super::Bounds;
 use glam::DVec3;
+
+/// Lattice steps, times the sum of a normal's components.
+const MARGIN: f64 = 120.0;
 
 /// All points p with `low <= normal . p <= high`. The default one is all of space.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -11,6 +15,20 @@ pub struct Plate {
     pub low: f32,
     /// The greatest height.
     pub high: f32,
+}
+
+/// What holds a patch or a part of one: a box and a plate.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Envelope {
+    /// The box.
+    pub bounds: Bounds,
+    /// The plate.
+    pub plate: Plate,
+}
+
+impl Envelope {
+    /// That of nothing.
+    pub const EMPTY: Self = Self { bounds: Bounds::EMPTY, plate: Plate { normal: [0; 3], low: 0.0, high: 0.0 } };
 }
 
 impl Plate {
@@ -24,6 +42,12 @@ impl Plate {
     /// The plate with this normal that holds heights from `low` to `high`, finite ones.
     pub fn around(normal: [i8; 3], low: f64, high: f64) -> Self {
         Self { normal, low: (low as f32).next_down(), high: (high as f32).next_up() }
+    }
+
+    /// By how much more than it is a plate has to reach on either side, in lengths of the normal, so that no ray which
+    /// hits something in it is said to pass it by. The argument is in `scene/accel/plates.rs`.
+    pub fn margin(&self) -> f64 {
+        1.0 + MARGIN * self.normal.iter().map(|x| f64::from(*x).abs()).sum::<f64>()
     }
 
     /// Height of a point above the origin, in lengths of the normal.

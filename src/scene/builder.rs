@@ -8,7 +8,7 @@ use crate::grid::{
     Borders, CellRect, MAX_CELLS, MOST_PIECE_BYTES, NODE_BYTES, NodeView, PieceLayout, PieceView, encode_node, is_node,
 };
 use crate::ids::{MeshId, PatchId};
-use crate::math::{Bounds, LatticeGrid};
+use crate::math::{Envelope, LatticeGrid};
 use crate::subdiv::{Dicer, PatchRates, snapped};
 
 /// Children of a node along u and v.
@@ -42,7 +42,7 @@ pub(super) struct Builder<'w> {
     vertices: LatticeGrid,
     /// Room for pieces that are looked at once.
     pub pieces: PieceRoom,
-    boxes: Vec<Bounds>,
+    envelopes: Vec<Envelope>,
     pub n_built: u64,
     pub n_pieces: u64,
     pub n_triangles: u64,
@@ -124,11 +124,11 @@ impl<'w> Builder<'w> {
             return ticket
                 .publish(BlockLayout { bytes: layout.bytes(), children: 0 }, |out| layout.encode(vertices, out));
         }
-        let children = self.child_boxes(of, &rates, cells);
+        let children = self.child_envelopes(of, &rates, cells);
         let n_slots = (NODE_SIDE * u32::from(children[1] - 1)) as usize + usize::from(children[0]);
-        let boxes = &self.boxes;
+        let envelopes = &self.envelopes;
         ticket.publish(BlockLayout { bytes: NODE_BYTES, children: n_slots }, |out| {
-            encode_node(cells, children, boxes, out);
+            encode_node(cells, children, envelopes, out);
         })
     }
 
@@ -173,26 +173,27 @@ impl<'w> Builder<'w> {
         }
     }
 
-    /// Puts the boxes of a node's children into `self.boxes`; returns their number along u and v.
-    fn child_boxes(&mut self, of: PatchContext<'_>, rates: &PatchRates, cells: CellRect) -> [u8; 2] {
+    /// Puts what holds a node's children into `self.envelopes`; returns their number along u and v.
+    fn child_envelopes(&mut self, of: PatchContext<'_>, rates: &PatchRates, cells: CellRect) -> [u8; 2] {
         let side = child_side(cells);
         let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
         // A child's cells are a part of the patch: as many splits lead to a quarter of its size.
         let depth = (rates.n_u.max(rates.n_v) / side).max(1).ilog2() + CHILD_BOX_DEPTH;
-        self.boxes.clear();
+        self.envelopes.clear();
         let (surface, from) = (of.mesh.surface(), [u32::from(cells.i0), u32::from(cells.j0)]);
         let n = [n_u, n_v];
         let no_holes = !surface.edited().has_holes();
-        if no_holes && self.dicer.bounds_of_parts(surface, of.patch, rates, from, n, side, depth, &mut self.boxes) {
+        let out = &mut self.envelopes;
+        if no_holes && self.dicer.envelopes_of_parts(surface, of.patch, rates, from, n, side, depth, out) {
             return n.map(|n| n as u8);
         }
         for b in 0..n_v {
             for a in 0..n_u {
                 let c = child_cells(cells, side, a, b);
                 let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
-                self.boxes.push(match surface.edited().hide_cells(of.patch, rates, i, j) {
-                    true => Bounds::EMPTY,
-                    false => self.dicer.bounds(surface, of.patch, rates, i, j, depth),
+                self.envelopes.push(match surface.edited().hide_cells(of.patch, rates, i, j) {
+                    true => Envelope::EMPTY,
+                    false => self.dicer.envelope(surface, of.patch, rates, i, j, depth),
                 });
             }
         }

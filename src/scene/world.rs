@@ -414,7 +414,8 @@ fn patch_boxes(
         let mut dicer = Dicer::default();
         let ((boxes, plates), patches_of_task) = &mut *task.lock();
         for ((bounds, plate), patch) in boxes.iter_mut().zip(plates.iter_mut()).zip(patches_of_task.iter()) {
-            (*bounds, *plate) = dicer.patch_bounds(surface, *patch, BOX_DEPTH);
+            let envelope = dicer.patch_envelope(surface, *patch, BOX_DEPTH);
+            (*bounds, *plate) = (envelope.bounds, envelope.plate);
         }
         let n_done = n_done.fetch_add(boxes.len(), Ordering::Relaxed) + boxes.len();
         progress(n_done as f64 / patches.len() as f64);

@@ -17,7 +17,7 @@ use super::surface::{PatchPoints, Surface};
 use crate::ids::{FaceId, PatchId};
 use crate::math::lattice_grid::MOST_NEAR;
 use crate::math::simd::{self, Kernel, Task};
-use crate::math::{Bounds, LatticeGrid, Plate, PointGrid, Rounding};
+use crate::math::{Bounds, Envelope, LatticeGrid, Plate, PointGrid, Rounding};
 use crate::topology::HalfEdges;
 use glam::{DVec3, Vec3};
 
@@ -328,9 +328,9 @@ impl Dicer {
         surface.normal(&mut self.points[lane], &mut self.evaluator, u, v)
     }
 
-    /// A box that holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing; `depth`
-    /// more splits towards irregular corners make it tighter.
-    pub fn bounds(
+    /// What holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing; `depth` more
+    /// splits towards irregular corners make it tighter. All plates of a patch are across its middle normal.
+    pub fn envelope(
         &mut self,
         surface: &Surface,
         patch: PatchId,
@@ -338,12 +338,12 @@ impl Dicer {
         i: [u32; 2],
         j: [u32; 2],
         depth: u32,
-    ) -> Bounds {
+    ) -> Envelope {
         let lane = self.load_with_heights(surface, patch);
         let points = &mut self.points[lane];
         let range = |[a, b]: [u32; 2], n: u32| [f64::from(a) / f64::from(n), f64::from(b) / f64::from(n)];
         let (u, v) = (range(i, rates.n_u), range(j, rates.n_v));
-        let mut bounds = surface.bounds(points, &mut self.evaluator, u, v, depth);
+        let mut extent = surface.bounds(points, &mut self.evaluator, u, v, depth);
         let snap = |[a, b]: [u32; 2], n: u32, r: u32| range([snapped(a, n, r), snapped(b, n, r)], r);
         for side in 0..4 {
             let (touches, n, along) = match side {
@@ -363,17 +363,17 @@ impl Dicer {
                     2 => (t, [1.0; 2]),
                     _ => ([0.0; 2], t),
                 };
-                bounds = bounds.union(surface.bounds(points, &mut self.evaluator, u, v, depth));
+                extent = extent.union(surface.bounds(points, &mut self.evaluator, u, v, depth));
             }
         }
-        to_lattice_box(&bounds)
+        in_lattice(points.normal(), &extent)
     }
 
-    /// Appends the [`bounds`](Self::bounds) of `n[0]` x `n[1]` parts of `side` x `side` cells from (`from[0]`,
+    /// Appends the [envelopes](Self::envelope) of `n[0]` x `n[1]` parts of `side` x `side` cells from (`from[0]`,
     /// `from[1]`) on, if they can be found together: where a square of two or four parts a side has no side that is
     /// coarser than its cells. Returns whether that is so.
     #[allow(clippy::too_many_arguments)]
-    pub fn bounds_of_parts(
+    pub fn envelopes_of_parts(
         &mut self,
         surface: &Surface,
         patch: PatchId,
@@ -382,7 +382,7 @@ impl Dicer {
         n: [u32; 2],
         side: u32,
         depth: u32,
-        out: &mut Vec<Bounds>,
+        out: &mut Vec<Envelope>,
     ) -> bool {
         let cells = [rates.n_u, rates.n_v];
         let is_plain = (0..4).all(|k| rates.sides[k] == cells[k % 2]);
@@ -395,22 +395,27 @@ impl Dicer {
         let rectangle = [0, 1].map(|k| [at(k, from[k]), at(k, from[k] + n[k] * side)]);
         let n = n[0] as usize;
         let mut boxes = [[Point::ZERO; 2]; MOST_PARTS * MOST_PARTS];
-        if !surface.grid_boxes(&mut self.points[lane], &mut self.evaluator, rectangle, n, depth, &mut boxes) {
+        let points = &mut self.points[lane];
+        if !surface.grid_boxes(points, &mut self.evaluator, rectangle, n, depth, &mut boxes) {
             return false;
         }
         let boxes = boxes.chunks_exact(MOST_PARTS).take(n).flat_map(|row| &row[..n]);
-        out.extend(boxes.map(|&[low, high]| to_lattice_box(&Extent { low, high })));
+        out.extend(boxes.map(|&[low, high]| in_lattice(points.normal(), &Extent { low, high })));
         true
     }
 
-    /// As [`bounds`](Self::bounds) for a whole patch at any rates; with a plate that holds its vertices as well, across
-    /// its middle normal.
-    pub fn patch_bounds(&mut self, surface: &Surface, patch: PatchId, depth: u32) -> (Bounds, Plate) {
+    /// As [`envelope`](Self::envelope) for a whole patch at any rates.
+    pub fn patch_envelope(&mut self, surface: &Surface, patch: PatchId, depth: u32) -> Envelope {
         let lane = self.load_with_heights(surface, patch);
         let points = &mut self.points[lane];
         let extent = surface.bounds(points, &mut self.evaluator, [0.0, 1.0], [0.0, 1.0], depth);
-        (to_lattice_box(&extent), to_lattice_plate(points.normal(), &extent))
+        in_lattice(points.normal(), &extent)
     }
+}
+
+/// What vertices of a surface that reaches so far lie in.
+fn in_lattice(normal: [i8; 3], extent: &Extent) -> Envelope {
+    Envelope { bounds: to_lattice_box(extent), plate: to_lattice_plate(normal, extent) }
 }
 
 /// By how much rounding moves a coordinate at most, and a little for evaluation errors.
@@ -537,15 +542,18 @@ mod tests {
             let surface = Surface::new(&mesh, 1).unwrap();
             for patch in surface.visible_patches() {
                 // Before and after there are points without heights.
-                let (bounds, plate) = dicer.patch_bounds(&surface, patch, 3);
+                let Envelope { bounds, plate } = dicer.patch_envelope(&surface, patch, 3);
                 let rates = surface.uniform_rates(patch, 1 + patch.0 % 9);
                 dicer.dice(&surface, patch, &rates, [0, rates.n_u], [0, rates.n_v], &mut grid);
-                assert_eq!((bounds, plate), dicer.patch_bounds(&surface, patch, 3));
-                let part = dicer.bounds(&surface, patch, &rates, [0, rates.n_u], [0, rates.n_v], 0);
+                assert_eq!(Envelope { bounds, plate }, dicer.patch_envelope(&surface, patch, 3));
+                let part = dicer.envelope(&surface, patch, &rates, [0, rates.n_u], [0, rates.n_v], 0);
                 for p in grid.points().map(|p| DVec3::from_array(p.map(f64::from))) {
-                    let height = Plate::height(plate.normal, p);
-                    assert!((f64::from(plate.low)..=f64::from(plate.high)).contains(&height), "{patch:?} {plate:?}");
-                    for b in [bounds, part] {
+                    for Envelope { bounds: b, plate } in [Envelope { bounds, plate }, part] {
+                        let height = Plate::height(plate.normal, p);
+                        assert!(
+                            (f64::from(plate.low)..=f64::from(plate.high)).contains(&height),
+                            "{patch:?} {plate:?}"
+                        );
                         assert!((b.min.as_dvec3().cmple(p) & p.cmple(b.max.as_dvec3())).all(), "{patch:?} {b:?} {p}");
                     }
                     n += 1;
@@ -564,7 +572,7 @@ mod tests {
         let mesh = crate::mesh::ControlMesh::from_polygons((0..36).map(at).map(turned).collect(), &faces).unwrap();
         let surface = Surface::new(&mesh, 1).unwrap();
         for patch in surface.visible_patches() {
-            let (bounds, plate) = Dicer::default().patch_bounds(&surface, patch, 3);
+            let Envelope { bounds, plate } = Dicer::default().patch_envelope(&surface, patch, 3);
             // Normals are rounded to a hundredth.
             let width = Plate::height(plate.normal.map(i8::abs), (bounds.max - bounds.min).as_dvec3());
             let thickness = f64::from(plate.high - plate.low);

@@ -221,10 +221,7 @@ impl Surface {
     pub fn face_of(&self, patch: PatchId) -> (FaceId, u32) {
         match &self.faces_of_patches {
             None => (FaceId(patch.0), 0),
-            Some(index) => {
-                let face = index.face(patch.0);
-                (FaceId(face), patch.0 - index.corners_at(patch.0).0)
-            }
+            Some(index) => (FaceId(index.face(patch.0)), index.place(patch.0)),
         }
     }
 

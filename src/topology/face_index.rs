@@ -87,6 +87,15 @@ impl FaceIndex {
         }
     }
 
+    /// Which of its face's half-edges (or patches) `h` is.
+    #[inline(always)]
+    pub fn place(&self, h: u32) -> u32 {
+        match self {
+            FaceIndex::Quads { .. } => h % 4,
+            FaceIndex::Mixed { is_start, .. } => h - Self::first(is_start, h),
+        }
+    }
+
     /// The half-edge that is first of those of the face of `h`.
     #[inline(always)]
     fn first(is_start: &[u64], h: u32) -> u32 {

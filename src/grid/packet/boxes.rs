@@ -2,6 +2,7 @@
 
 use super::{PACKET, RayPacket};
 use crate::grid::boxes::{ALL_X, ALL_Y, ALL_Z, Head, LaneHits};
+use crate::grid::child_plates::SeenPlates;
 use crate::grid::{NodeView, Plane};
 use crate::math::simd::Kernel;
 
@@ -20,13 +21,32 @@ impl SeenBoxes {
     /// The rays of the packet that meet the box of a lane before their ends, as bits.
     #[inline(always)]
     pub fn meeting<K: Kernel>(&self, k: K, packet: &RayPacket, lane: usize) -> u32 {
+        let [near, far] = self.lane(lane);
+        packet.meeting(k, near, far)
+    }
+
+    /// Those of them that meet the plate of the lane within the box.
+    #[inline(always)]
+    pub fn meeting_plate<K: Kernel>(&self, k: K, packet: &RayPacket, lane: usize, plates: &SeenPlates<'_>) -> u32 {
+        let [near, far] = self.lane(lane);
+        packet.meeting_plate(k, near, far, &plates.get(lane))
+    }
+
+    /// The planes of a lane.
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> [[f32; 3]; 2] {
         let [near, far] = [&self.near, &self.far];
-        let [x, y, z] = [near[0][lane], near[1][lane], near[2][lane]];
-        packet.meeting(k, [x, y, z], [far[0][lane], far[1][lane], far[2][lane]])
+        [[near[0][lane], near[1][lane], near[2][lane]], [far[0][lane], far[1][lane], far[2][lane]]]
     }
 }
 
 impl NodeView<'_> {
+    /// The plates of children as rays of a packet see them.
+    #[inline(always)]
+    pub fn seen_plates(&self, packet: &RayPacket) -> SeenPlates<'_> {
+        self.plates.seen_from(self.head.base, packet.origin())
+    }
+
     /// The children whose boxes some ray of a packet may meet, and where at least, if no ray had an end; `seen`
     /// receives their boxes.
     #[inline(always)]

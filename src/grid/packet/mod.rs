@@ -52,6 +52,8 @@ type OfRays<T> = [T; PACKET];
 pub struct RayPacket {
     /// 1 / direction, by axis.
     inv: [OfRays<f32>; 3],
+    /// Directions.
+    towards: [OfRays<f32>; 3],
     /// Hits beyond are ignored; negative for places without a ray.
     t_max: OfRays<f32>,
     /// The least and the greatest inverse, by axis.
@@ -69,6 +71,7 @@ impl Default for RayPacket {
     fn default() -> Self {
         Self {
             inv: [[1.0; PACKET]; 3],
+            towards: [[1.0; PACKET]; 3],
             t_max: [-1.0; PACKET],
             inv_range: [[1.0; 2]; 3],
             shear: [[0.0; 3]; PACKET],
@@ -96,6 +99,7 @@ impl RayPacket {
         }
         let one = k.splat(1.0);
         self.inv = [k.store(k.div(one, along[0])), k.store(k.div(one, along[1])), k.store(k.div(one, along[2]))];
+        self.towards = direction;
         self.inv_range = [range(&self.inv[0]), range(&self.inv[1]), range(&self.inv[2])];
         let [a, b, c] = axes.map(|axis| axis as usize % 3);
         let [shear_x, shear_y] = [k.store(k.div(along[a], along[c])), k.store(k.div(along[b], along[c]))];
@@ -129,6 +133,13 @@ impl RayPacket {
             leave = k.min(k.mul(far[axis], inv), leave);
         }
         k.le(enter, leave)
+    }
+
+    /// The lattice point nearest to the origin of all rays.
+    #[inline(always)]
+    pub fn origin(&self) -> [i32; 3] {
+        let [x, y, z, _] = self.first.cell;
+        [x, y, z]
     }
 
     /// The first ray, whose origin and axes are those of all.
@@ -195,14 +206,47 @@ impl RayPacket {
     /// The rays that meet a box whose planes lie at these distances from the origin, before their ends, as bits.
     #[inline(always)]
     pub fn meeting<K: Kernel>(&self, k: K, near: [f32; 3], far: [f32; 3]) -> u32 {
-        let (mut enter, mut leave) = (k.splat(0.0), k.load(&self.t_max));
+        let (enter, leave) = self.through(k, near, far);
+        k.le(enter, k.min(leave, k.load(&self.t_max)))
+    }
+
+    /// Those of them that meet a plate within the box.
+    #[inline(always)]
+    pub fn meeting_plate<K: Kernel>(&self, k: K, near: [f32; 3], far: [f32; 3], plate: &SeenPlate) -> u32 {
+        let (enter, leave) = self.through(k, near, far);
+        let boxes = k.le(enter, k.min(leave, k.load(&self.t_max)));
+        let (mut slope, start) = (k.splat(0.0), k.splat(plate.start));
+        for (of_axis, normal) in self.towards.iter().zip(plate.normal) {
+            slope = k.mul_add(k.splat(normal), k.load(of_axis), slope);
+        }
+        let (first, last) = (k.mul_add(enter, slope, start), k.mul_add(leave, slope, start));
+        boxes & k.le(k.min(first, last), k.splat(plate.high)) & k.le(k.splat(plate.low), k.max(first, last))
+    }
+
+    /// Where rays enter a box, at 0 or later, and where they leave it.
+    #[inline(always)]
+    fn through<K: Kernel>(&self, k: K, near: [f32; 3], far: [f32; 3]) -> (K::F, K::F) {
+        let (mut enter, mut leave) = (k.splat(0.0), k.splat(f32::MAX));
         for axis in 0..3 {
             let inv = k.load(&self.inv[axis]);
             enter = k.max(k.mul(k.splat(near[axis]), inv), enter);
             leave = k.min(k.mul(k.splat(far[axis]), inv), leave);
         }
-        k.le(enter, leave)
+        (enter, leave)
     }
+}
+
+/// A plate as the rays of a packet see it: heights above any one point, in lengths of the normal.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenPlate {
+    /// Across the plate.
+    pub normal: [f32; 3],
+    /// The height of the rays' origin.
+    pub start: f32,
+    /// The least height in the plate, with its [margin](crate::math::Plate::margin).
+    pub low: f32,
+    /// The greatest one.
+    pub high: f32,
 }
 
 /// Directions made ready for a lattice, as for [`LatticeRay`].

@@ -3,7 +3,7 @@
 use super::support::{Piece, Random, sheet, whole};
 use crate::grid::boxes::{CellRect, IntegerBox};
 use crate::grid::{NODE_BYTES, NodeView, encode_node};
-use crate::math::Bounds;
+use crate::math::{Bounds, Envelope, Plate};
 use glam::{IVec3, Vec3};
 
 /// Whether `outer` holds `inner` and is at most two steps of the piece's boxes larger.
@@ -44,6 +44,10 @@ fn a_box_reaches_from_end_to_end_of_the_lattice() {
     assert!(high.iter().all(|h| (1 << 24..(1 << 24) + (1 << 18)).contains(h)), "{high:?}");
 }
 
+fn in_any_plate(bounds: Bounds) -> Envelope {
+    Envelope { bounds, plate: Plate::default() }
+}
+
 #[test]
 fn a_node_holds_the_boxes_of_its_children() {
     let mut random = Random(2);
@@ -52,7 +56,8 @@ fn a_node_holds_the_boxes_of_its_children() {
         let bounds: Vec<Bounds> = (0..n).map(|_| (0..2).map(|_| random.point(3e6).as_vec3()).collect()).collect();
         let mut bytes = [0u32; NODE_BYTES / 4];
         let cells = CellRect { i0: 8, j0: 0, i1: 40, j1: 32 };
-        encode_node(cells, children, &bounds, bytemuck::cast_slice_mut(&mut bytes));
+        let envelopes: Vec<_> = bounds.iter().map(|&bounds| in_any_plate(bounds)).collect();
+        encode_node(cells, children, &envelopes, bytemuck::cast_slice_mut(&mut bytes));
         let node = NodeView::new(bytemuck::cast_slice(&bytes));
         assert_eq!((node.cells(), node.children(), node.lanes().count_ones() as usize), (cells, children, n));
         for (c, b) in bounds.iter().enumerate() {
@@ -68,7 +73,7 @@ fn a_node_holds_the_boxes_of_its_children() {
 fn a_node_cuts_boxes_to_the_lattice() {
     let b = Bounds { min: Vec3::splat(-3e7), max: Vec3::splat(f32::INFINITY) };
     let mut bytes = [0u32; NODE_BYTES / 4];
-    encode_node(whole(8, 8), [1, 1], &[b], bytemuck::cast_slice_mut(&mut bytes));
+    encode_node(whole(8, 8), [1, 1], &[in_any_plate(b)], bytemuck::cast_slice_mut(&mut bytes));
     let [low, high] = NodeView::new(bytemuck::cast_slice(&bytes)).head.decoded_box(0);
     assert!(low == [-(1 << 24); 3] && high.iter().all(|h| *h >= 1 << 24));
 }

@@ -1,6 +1,7 @@
 //! Pieces and nodes against slow, obvious code.
 
 mod boxes;
+mod child_plates;
 mod encoding;
 mod horizon;
 mod packet;

@@ -83,10 +83,11 @@ impl<K: Kernel> PacketWalk<'_, K> {
             }
             let lane = k.first(self.order).0;
             self.order = k.without(self.order, lane);
-            let rays = self.nodes.boxes[self.node as usize].meeting(k, packet, lane);
+            let slot = self.node * LANES as u32 + lane as u32;
+            let reference = self.nodes.refs[self.node as usize][lane % LANES];
+            let rays = self.meeting(packet, &self.nodes.boxes[self.node as usize], lane, reference, slot);
             if rays != 0 {
-                let reference = self.nodes.refs[self.node as usize][lane % LANES];
-                return Some(Met { reference, slot: self.node * LANES as u32 + lane as u32, rays });
+                return Some(Met { reference, slot, rays });
             }
         }
     }
@@ -105,11 +106,24 @@ impl<K: Kernel> PacketWalk<'_, K> {
             }
             let lane = self.lanes.trailing_zeros() as usize % LANES;
             self.lanes &= self.lanes - 1;
-            let rays = self.group.boxes.meeting(self.kernel, packet, lane);
+            let (reference, slot) = (self.group.refs[lane], self.group.slots[lane]);
+            let rays = self.meeting(packet, &self.group.boxes, lane, reference, slot);
             if rays != 0 {
-                return Some(Met { reference: self.group.refs[lane], slot: self.group.slots[lane], rays });
+                return Some(Met { reference, slot, rays });
             }
         }
+    }
+
+    /// The rays that meet one of these boxes, and a leaf's plate within, as bits.
+    #[inline(always)]
+    fn meeting(&self, packet: &RayPacket, boxes: &NodeBoxes, lane: usize, reference: u32, slot: u32) -> u32 {
+        let [distance, to_far] = boxes.seen_from(packet, lane);
+        if reference & LEAF == 0 {
+            return packet.meeting(self.kernel, distance, to_far);
+        }
+        let plates = &self.nodes.plates[slot as usize / LANES];
+        let plate = &plates.seen_from(packet.origin(), boxes, lane, slot as usize % LANES);
+        packet.meeting_plate(self.kernel, distance, to_far, plate)
     }
 
     /// Goes on at a node below the present one, or below the front.
@@ -143,15 +157,15 @@ impl NodeBoxes {
         packet.range_within(k, distance, to_far)
     }
 
-    /// The rays of a packet that meet a box, as bits.
+    /// How far the planes of a box are from a packet's origin: those where rays enter, and those where they leave.
     #[inline(always)]
-    fn meeting<K: Kernel>(&self, k: K, packet: &RayPacket, lane: usize) -> u32 {
+    fn seen_from(&self, packet: &RayPacket, lane: usize) -> [[f32; 3]; 2] {
         let [(near, from_near), (far, from_far)] = packet.sides();
         let [mut distance, mut to_far] = [[0.0; 3]; 2];
         for axis in 0..3 {
             distance[axis] = self.coordinate(near[axis], lane) - from_near[axis];
             to_far[axis] = self.coordinate(far[axis], lane) - from_far[axis];
         }
-        packet.meeting(k, distance, to_far)
+        [distance, to_far]
     }
 }

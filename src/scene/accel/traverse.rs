@@ -104,7 +104,7 @@ impl TopLevel {
 pub(super) struct NodeLists<'t> {
     pub boxes: &'t [NodeBoxes],
     pub refs: &'t [Refs],
-    plates: &'t [Plates],
+    pub plates: &'t [Plates],
 }
 
 /// A ray's way through the tree, from leaf to leaf.
