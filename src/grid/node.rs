@@ -14,8 +14,8 @@ pub const NODE_BYTES: usize = HEAD_BYTES + size_of::<ChildPlates>();
 const NO_FORMAT: u8 = 0;
 
 /// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `envelopes` has one
-/// in lattice units for each, u fastest; it must hold every lattice vertex of the child, and the normals of all plates
-/// must be the same. A child with an empty box is never met; one at least is not empty. `out` is [`NODE_BYTES`] long.
+/// in lattice units for each, u fastest; it must hold every lattice vertex of the child. A child with an empty box is
+/// never met; one at least is not empty, and the plates of those have one normal. `out` is [`NODE_BYTES`] long.
 #[inline]
 pub fn encode_node(cells: CellRect, children: [u8; 2], envelopes: &[Envelope], out: &mut [u8]) {
     simd::run(EncodeNode { cells, children, envelopes, out });
@@ -59,7 +59,8 @@ fn encode(cells: CellRect, children: [u8; 2], envelopes: &[Envelope], out: &mut 
     let head: &mut Head = bytemuck::from_bytes_mut(head);
     head.set(whole, &boxes, children, cells, [0; 2], NO_FORMAT);
     children_and_lanes().filter(|(of, _)| of.bounds.is_empty()).for_each(|(_, lane)| head.turn_inside_out(lane));
-    let plates_and_lanes = children_and_lanes().map(|(of, lane)| (&of.plate, lane));
+    let filled = children_and_lanes().filter(|(of, _)| !of.bounds.is_empty());
+    let plates_and_lanes = filled.map(|(of, lane)| (&of.plate, lane));
     bytemuck::from_bytes_mut::<ChildPlates>(plates).set(whole[0], plates_and_lanes);
 }
 
