@@ -1,4 +1,4 @@
-//! The plates of a node's children: as `scene/accel/plates.rs` has it for patches, which tells why they hide nothing that
+//! The plates of a node's children, which spare rays those that they pass within their boxes: as `scene/accel/plates.rs` has it for patches, which tells why they hide nothing that
 //! would be hit. The children are parts of one patch, so that all plates are across one normal.
 
 use super::boxes::{ALL_X, ALL_Y, ALL_Z, Head};

@@ -5,7 +5,7 @@
 //! **lattice**. A grid is stored as **pieces** of at most 8x8 cells, so that a ray pays for the corner it touches. A
 //! piece is one block of bytes: a head, sixteen boxes around **blocks** of 2x2 cells, and the vertices as offsets from
 //! the piece's lowest corner. The pieces of a larger patch hang from a tree of **nodes**, blocks with boxes around up
-//! to 4x4 children.
+//! to 4x4 children, and plates: pairs of parallel planes that have a child between them.
 //!
 //! ```text
 //!   piece                                             block: 2x2 cells = 8 triangles = one SIMD test

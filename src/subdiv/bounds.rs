@@ -1,4 +1,4 @@
-//! Conservative boxes of parts of patches, without evaluating them.
+//! Conservative boxes of parts of patches, and bounds of their heights, without evaluating them.
 
 use super::eval::{Evaluator, Point, quarter};
 use super::extent::Extent;

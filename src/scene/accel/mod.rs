@@ -5,23 +5,23 @@
 //! address is known as soon as the node is tested, and can be fetched ahead.
 //!
 //! ```text
-//!   node, 192 + 32 bytes                 open node, on the stack
-//!   ┌───────────────────────┬─────────┐  ┌───────────────────────────────────┬──────┐
-//!   │ x, y, z low, x, y, z  │ 8 refs  │  │ for each lane the place of its    │ node │
-//!   │ high: 6 x 8 floats    │ 32 bits │  │ entry in the order, or LAST, 8x16 │      │
-//!   └───────────────────────┴─────────┘  └───────────────────────────────────┴──────┘
+//!   node, 192 + 32 + 44 bytes                       open node, on the stack
+//!   ┌───────────────────────┬─────────┬──────────┐  ┌───────────────────────────────────┬──────┐
+//!   │ x, y, z low, x, y, z  │ 8 refs  │ 8 plates │  │ for each lane the place of its    │ node │
+//!   │ high: 6 x 8 floats    │ 32 bits │ 40 bits  │  │ entry in the order, or LAST, 8x16 │      │
+//!   └───────────────────────┴─────────┴──────────┘  └───────────────────────────────────┴──────┘
 //! ```
 //!
 //! # Invariants
 //! 1. A lane's box holds every box below it.
 //! 2. The test of a box is conservative against the triangle test ([`LatticeRay`](crate::grid::LatticeRay) has the
-//!    argument), so a patch that a ray hits is visited.
+//!    argument), so a patch that a ray hits is visited; so is the test of a plate (`plates.rs` has it).
 //! 3. The lanes of a node are visited in the order of their entry, to within two [places](crate::math::simd::place);
 //!    those entered at exactly `t_max` are visited too, so that ties are seen.
 //! 4. No arrangement of boxes makes the tree deep or its build quadratic.
 //!
 //! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs).
-//! Read `traverse.rs` first; `front.rs` lets rays that are much alike begin further down, `packet_walk.rs` takes eight
+//! Read `traverse.rs` first, then `plates.rs`; `front.rs` lets rays that are much alike begin further down, `packet_walk.rs` takes eight
 //! of them at once.
 
 mod build;

@@ -57,7 +57,7 @@ impl Evaluator {
         }
     }
 
-    /// As `bounds` for a patch under edits.
+    /// As `bounds` for a patch under edits, whose points have no heights.
     pub fn edited_bounds(
         &mut self,
         library: &PlanLibrary,
