@@ -18,7 +18,7 @@ pub enum FaceIndex {
         n_faces: u32,
         /// Number of half-edges.
         n_things: u32,
-        /// First half-edge of every [`FACES_PER_MARK`]th face.
+        /// First half-edge of every eighth face.
         marks: Vec<u32>,
         /// A bit per half-edge, set where a face starts, and one more at the end.
         is_start: Vec<u64>,
