@@ -20,8 +20,8 @@ use parking_lot::Mutex;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 
 /// Quarters of an irregular patch that its box and plate look into: more make them tighter, and building slower. With
-/// one less, rays look up 1.06 (bigguy) to 1.23 (bishop) times as much at rate 8; with one more, 0.91 on bishop, which
-/// takes 1.2 times as long to prepare.
+/// one less, rays look up 1.08 (bigguy) to 1.23 (bishop) times as much at rate 8; with one more, 0.90 on bishop, which
+/// takes 1.2 times as long to prepare. (Both before poles went deeper than that.)
 const BOX_DEPTH: u32 = 4;
 
 /// Patches whose boxes a thread finds before it asks for more.
