@@ -184,6 +184,29 @@ mod tests {
         (corners, corners.iter().map(|p| p.as_vec3()).collect(), Plate::around(normal, low, high))
     }
 
+    /// As they are kept, plates hold the given ones with their margin, and little more.
+    #[test]
+    fn plates_are_rounded_outwards() {
+        for (round, size) in (0..200).zip([30.0, 3e3, 4e6].into_iter().cycle()) {
+            let sheets: Vec<_> = (0..8).map(|k| sheet(8 * round + k, size)).collect();
+            let (boxes, plates): (Vec<_>, Vec<_>) = sheets.iter().map(|s| (s.1, s.2)).unzip();
+            let tree = TopLevel::build(&boxes, 1).with_plates(&plates, 1);
+            for leaf in tree.leaves() {
+                let (node, lane) = (leaf.slot as usize / LANES, leaf.slot as usize % LANES);
+                let (kept, plate) = (&tree.nodes.plates[node], &plates[leaf.patch.idx()]);
+                let b = &boxes[leaf.patch.idx()];
+                let above = Plate::height(plate.normal, 0.5 * (b.min.as_dvec3() + b.max.as_dvec3()));
+                let unit = f64::from(kept.unit);
+                let (middle, half) = (unit * f64::from(kept.middles[lane]), unit * f64::from(kept.halves[lane]));
+                let below = f64::from(plate.low) - plate.margin() - (above + middle - half);
+                let beyond = above + middle + half - (f64::from(plate.high) + plate.margin());
+                // But for the rounding of f64.
+                assert!(below > -1e-3 && beyond > -1e-3, "{below} {beyond}, {unit}");
+                assert!(below + beyond < 3.1 * unit, "{below} {beyond}, {unit}");
+            }
+        }
+    }
+
     /// Patches that a ray visits on its way to the nearest hit, and to any.
     struct Visits<'a>(&'a TopLevel, &'a LatticeRay);
 
