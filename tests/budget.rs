@@ -20,7 +20,7 @@ const RENDER: [&str; 13] = [
     "-o",
     "g.exr",
     "--size",
-    "160x120",
+    "240x180",
     "--rate",
     "fixed:32",
     "--integrator",
