@@ -152,14 +152,13 @@ impl Head {
     pub fn test<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> LaneHits {
         let mut t_near = [0.0; 16];
         let slabs = Slabs::new(kernel, self, ray);
-        let end = kernel.splat(t_max);
-        let (enter, leave) = slabs.test(kernel, self.half_of_planes(0));
-        t_near[..8].copy_from_slice(&kernel.store(enter));
-        let mut mask = kernel.le(enter, kernel.min(leave, end));
+        let (low, low_t) = slabs.test(kernel, self.half_of_planes(0), t_max);
+        t_near[..8].copy_from_slice(&kernel.store(low_t));
+        let mut mask = low;
         if self.has_high_lanes() {
-            let (enter, leave) = slabs.test(kernel, self.half_of_planes(1));
-            t_near[8..].copy_from_slice(&kernel.store(enter));
-            mask |= kernel.le(enter, kernel.min(leave, end)) << 8;
+            let (high, high_t) = slabs.test(kernel, self.half_of_planes(1), t_max);
+            t_near[8..].copy_from_slice(&kernel.store(high_t));
+            mask |= high << 8;
         }
         LaneHits { mask: mask & u32::from(self.mask), t_near }
     }
@@ -168,12 +167,9 @@ impl Head {
     #[inline(always)]
     pub fn lanes_met<K: Kernel>(&self, kernel: K, ray: &LatticeRay, t_max: f32) -> u32 {
         let slabs = Slabs::new(kernel, self, ray);
-        let end = kernel.splat(t_max);
-        let (enter, leave) = slabs.test(kernel, self.half_of_planes(0));
-        let mut mask = kernel.le(enter, kernel.min(leave, end));
+        let mut mask = slabs.test(kernel, self.half_of_planes(0), t_max).0;
         if self.has_high_lanes() {
-            let (enter, leave) = slabs.test(kernel, self.half_of_planes(1));
-            mask |= kernel.le(enter, kernel.min(leave, end)) << 8;
+            mask |= slabs.test(kernel, self.half_of_planes(1), t_max).0 << 8;
         }
         mask & u32::from(self.mask)
     }
@@ -228,9 +224,16 @@ impl<K: Kernel> Slabs<K> {
         }
     }
 
+    /// The test of eight lanes: their bits, and where the ray enters.
+    #[inline(always)]
+    fn test(&self, k: K, planes: &[[u8; 4]; 22], t_max: f32) -> (u32, K::F) {
+        let (enter, leave) = self.through(k, planes);
+        (k.le(enter, k.min(leave, k.splat(t_max))), enter)
+    }
+
     /// Where the ray enters eight lanes, at 0 or later, and where it leaves them.
     #[inline(always)]
-    pub fn test(&self, k: K, planes: &[[u8; 4]; 22]) -> (K::F, K::F) {
+    pub fn through(&self, k: K, planes: &[[u8; 4]; 22]) -> (K::F, K::F) {
         let ([near_x, near_y, near_z], [far_x, far_y, far_z]) = (self.near_planes, self.far_planes);
         let mut enter = k.max(self.plane_t::<ALL_X>(k, planes, near_x, self.near), k.splat(0.0));
         enter = k.max(self.plane_t::<ALL_Y>(k, planes, near_y, self.near), enter);

@@ -1,5 +1,6 @@
-//! The plates of a node's children, which spare rays those that they pass within their boxes: as `scene/accel/plates.rs` has it for patches, which tells why they hide nothing that
-//! would be hit. The children are parts of one patch, so that all plates are across one normal.
+//! The plates of a node's children, which spare rays those that they pass within their boxes: as
+//! `scene/accel/plates.rs` has it for patches, which tells why they hide nothing that would be hit. The children are
+//! parts of one patch, so that all plates are across one normal.
 
 use super::boxes::{ALL_X, ALL_Y, ALL_Z, Head};
 use super::{LatticeRay, SeenPlate};
@@ -72,8 +73,8 @@ impl ChildPlates {
         Rise { start, slope: sum_of_three(k, k.mul(normal, k.load(&ray.towards))) }
     }
 
-    /// Lanes 0 to 7 or 8 to 15 whose plates a ray meets on its way through their boxes, which it enters and leaves there,
-    /// as bits.
+    /// Lanes 0 to 7 or 8 to 15 whose plates a ray meets on its way through their boxes, which it enters and leaves
+    /// there, as bits.
     #[inline(always)]
     pub fn met<K: Kernel>(&self, k: K, half: usize, rise: &Rise<K>, enter: K::F, leave: K::F) -> u32 {
         let unit = k.splat(self.unit);

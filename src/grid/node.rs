@@ -140,7 +140,7 @@ impl<'b> NodeView<'b> {
     /// The test of lanes 0 to 7 or 8 to 15: their bits, and where the ray enters the boxes.
     #[inline(always)]
     fn test_half<K: Kernel>(&self, k: K, through: &Through<K>, half: usize) -> (u32, K::F) {
-        let (enter, leave) = through.slabs.test(k, self.head.half_of_planes(half));
+        let (enter, leave) = through.slabs.through(k, self.head.half_of_planes(half));
         let boxes = k.le(enter, k.min(leave, k.splat(through.t_max)));
         (boxes & self.plates.met(k, half, &through.rise, enter, leave), enter)
     }

@@ -25,8 +25,8 @@ fn envelope(normal: [i8; 3], corners: &[DVec3; 3]) -> Envelope {
     }
 }
 
-/// Children that a ray visits on its way to the nearest hit, to any, and in a packet of eight rays along directions that
-/// are all much like its own; none of a packet that is none.
+/// Children that a ray visits on its way to the nearest hit, to any, and in a packet of eight rays along directions
+/// that are all much like its own; none of a packet that is none.
 struct Met<'a>(NodeView<'a>, DVec3, [DVec3; PACKET], f32);
 
 impl Task for Met<'_> {

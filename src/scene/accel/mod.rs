@@ -21,8 +21,8 @@
 //! 4. No arrangement of boxes makes the tree deep or its build quadratic.
 //!
 //! Ideas: Wald, Benthin, Boulos 2008 (wide trees), Wald 2007 (binned building), Ize 2013 and Woop et al. 2013 (slabs).
-//! Read `traverse.rs` first, then `plates.rs`; `front.rs` lets rays that are much alike begin further down, `packet_walk.rs` takes eight
-//! of them at once.
+//! Read `traverse.rs` first, then `plates.rs`; `front.rs` lets rays that are much alike begin further down,
+//! `packet_walk.rs` takes eight of them at once.
 
 mod build;
 mod collapse;

@@ -1,8 +1,8 @@
 //! Packets of rays on their way from the front of their bundle to leaves.
 //!
 //! What a packet meets is looked at twice, as in `grid/packet/`: eight boxes for all rays, then those that some ray may
-//! meet for each, and of leaves the plates as well. Groups of the front come in its order, lanes of nodes below it in the order in which the packet enters
-//! them.
+//! meet for each, and of leaves the plates as well. Groups of the front come in its order, lanes of nodes below it in
+//! the order in which the packet enters them.
 
 use super::front::Group;
 use super::traverse::{NodeLists, OpenNode, TraversalStack};

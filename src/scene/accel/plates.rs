@@ -2,18 +2,18 @@
 //!
 //! The box of a patch that is neither small nor parallel to its sides is mostly empty, and most rays that meet it pass
 //! the patch by. A patch is a sheet, though: it lies in a **plate**, the space between two parallel planes, across its
-//! middle normal. A ray whose way through the box is all above the plate, or all below, does not meet the patch; nothing
-//! is looked up or built for it then.
+//! middle normal. A ray whose way through the box is all above the plate, or all below, does not meet the patch;
+//! nothing is looked up or built for it then.
 //!
-//! A node keeps the plates of its leaves in 44 bytes, as **heights** along the normals above the middles of their boxes.
-//! Heights of the ray where it enters and leaves a box are compared with those: what lies between is between.
+//! A node keeps the plates of its leaves in 44 bytes, as **heights** along the normals above the middles of their
+//! boxes. Heights of the ray where it enters and leaves a box are compared with those: what lies between is between.
 //!
 //! # Why no plate hides a triangle that would be hit
 //! Write u = 2^-24, and N for the sum of a normal's components, at most 381. [`LatticeRay`] has the rest of the words,
 //! and shows that a hit of a triangle has a point P of it, in its plate, which is within 8 u `reach` along each axis of
 //! the point of the ray at P's depth t; and that t lies between where the ray is said to enter the box and to leave it.
-//! So the height of the ray at t is within 8 N u `reach` of the plate. Between two ends heights lie between those of the
-//! ends, and these are computed with errors of
+//! So the height of the ray at t is within 8 N u `reach` of the plate. Between two ends heights lie between those of
+//! the ends, and these are computed with errors of
 //!
 //! * 5 N u `reach` for that of the origin above the middle of the box: half a step and rounding to f32 of the origin,
 //!   one step of the middle, the rounding of their difference, of products and of sums,
@@ -23,8 +23,8 @@
 //! 18 N u `reach` in all. Plates are thickened by 40 N u `reach` on either side when they are put into nodes, with the
 //! longest `reach` there is, 3 times 2^24: 120 N, some 120 to 210 lattice steps. All other rounding is outwards.
 //!
-//! Where the ray ends does not matter: of a triangle that is nearly a line the distance is not known well, and t may lie
-//! behind a hit of another one that is said to be farther.
+//! Where the ray ends does not matter: of a triangle that is nearly a line the distance is not known well, and t may
+//! lie behind a hit of another one that is said to be farther.
 
 use super::traverse::spread;
 use super::{EMPTY, LANES, LEAF, NodeBoxes, Nodes, Refs, TopLevel};
@@ -54,13 +54,13 @@ pub(super) struct Plates {
 
 const _: () = assert!(size_of::<Plates>() == 44);
 
-/// What plates need of a ray.
-pub(super) struct Rise<K: Kernel> {
+/// What plates need of a ray: origin and direction, each coordinate in all lanes.
+pub(super) struct SpreadRay<K: Kernel> {
     origin: [K::F; 3],
     direction: [K::F; 3],
 }
 
-impl<K: Kernel> Rise<K> {
+impl<K: Kernel> SpreadRay<K> {
     #[inline(always)]
     pub fn new(k: K, ray: &LatticeRay) -> Self {
         Self { origin: spread(k, k.floats_twice(&ray.cell)), direction: spread(k, k.load(&ray.towards)) }
@@ -115,10 +115,10 @@ impl Plates {
         SeenPlate { normal, start: start - middle, low: -half, high: half }
     }
 
-    /// How far beyond its plate a ray stays that enters and leaves the node's boxes there, lane by lane: zero or less if
-    /// it meets the plate.
+    /// How far beyond its plate a ray stays that enters and leaves the node's boxes there, lane by lane: zero or less
+    /// if it meets the plate.
     #[inline(always)]
-    pub fn distance<K: Kernel>(&self, k: K, boxes: &NodeBoxes, ray: &Rise<K>, enter: K::F, leave: K::F) -> K::F {
+    pub fn distance<K: Kernel>(&self, k: K, boxes: &NodeBoxes, ray: &SpreadRay<K>, enter: K::F, leave: K::F) -> K::F {
         let unit = k.splat(self.unit);
         let mut start = k.mul(k.widen_signed(&self.middles), k.sub(k.splat(-0.0), unit));
         let mut slope = k.splat(0.0);
@@ -154,6 +154,7 @@ impl TopLevel {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::{random, random_point};
     use super::*;
     use crate::grid::TriangleId;
     use crate::grid::{PACKET, RayPacket};
@@ -162,17 +163,6 @@ mod tests {
     use crate::math::simd::{Portable, Task, run};
     use crate::math::{Ray, RayBounds};
     use crate::scene::accel::{Front, LeafRef, LeafWalk, TraversalStack};
-
-    fn random(n: u64) -> f64 {
-        let z = (n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let z = (z ^ (z >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        ((z ^ (z >> 32)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Each coordinate up to `r` from zero.
-    fn random_point(n: u64, r: f64) -> DVec3 {
-        DVec3::from_array([0, 1, 2].map(|k| r * (2.0 * random(3 * n + k) - 1.0)))
-    }
 
     /// A quad that is somewhat bent: its corners, its box and its plate.
     fn sheet(n: u64, size: f64) -> ([DVec3; 4], Bounds, Plate) {

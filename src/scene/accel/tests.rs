@@ -7,13 +7,13 @@ use crate::math::{Bounds, DBounds, Ray, RayBounds};
 use glam::{DVec3, Vec3};
 
 /// Numbers in [0, 1) that are the same in every run.
-fn random(n: u64) -> f64 {
+pub(super) fn random(n: u64) -> f64 {
     let z = (n + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     ((z ^ (z >> 32)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-fn random_point(n: u64, r: f64) -> DVec3 {
+pub(super) fn random_point(n: u64, r: f64) -> DVec3 {
     DVec3::from_array([3 * n, 3 * n + 1, 3 * n + 2].map(|n| r * (2.0 * random(n) - 1.0)))
 }
 
@@ -360,8 +360,8 @@ fn a_visit_finds_every_patch_but_for_those_in_boxes_that_are_not_entered() {
     assert!((0..3000).all(|k| !is_left(&boxes[k]) || found.binary_search(&k).is_ok()));
 }
 
-/// The leaves that a packet of rays that end at a place visits from its bundle's front, with the rays for which it does;
-/// `None` if the rays are no packet.
+/// The leaves that a packet of rays that end at a place visits from its bundle's front, with the rays for which it
+/// does; `None` if the rays are no packet.
 struct PacketVisits<'a>(&'a TopLevel, DVec3, &'a [DVec3; PACKET], f32);
 
 impl Task for PacketVisits<'_> {

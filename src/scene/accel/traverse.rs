@@ -1,6 +1,6 @@
 //! Rays through the wide tree.
 
-use super::plates::{Plates, Rise};
+use super::plates::{Plates, SpreadRay};
 use super::{LANES, LEAF, LeafRef, LeafWalk, NodeBoxes, Refs, TopLevel};
 use crate::grid::{LatticeRay, Plane};
 use crate::ids::PatchId;
@@ -39,9 +39,9 @@ impl TopLevel {
         ray: &'t LatticeRay,
         stack: &'t mut TraversalStack,
     ) -> Walk<'t, K> {
-        let (nodes, slabs, rise) = (self.nodes(), Slabs::new(kernel, ray), Rise::new(kernel, ray));
+        let (nodes, slabs, spread) = (self.nodes(), Slabs::new(kernel, ray), SpreadRay::new(kernel, ray));
         let order = kernel.load_order(&[K::LAST; LANES]);
-        Walk { kernel, slabs, rise, nodes, stack: stack.open_of_size(self.stack_need), n: 0, node: 0, order }
+        Walk { kernel, slabs, spread, nodes, stack: stack.open_of_size(self.stack_need), n: 0, node: 0, order }
     }
 
     /// A walk along a ray in any order, at its start.
@@ -54,8 +54,8 @@ impl TopLevel {
     ) -> AnyWalk<'t, K> {
         let stack = stack.nodes_of_size(self.stack_need + LANES);
         stack[0] = END;
-        let (slabs, rise, nodes) = (Slabs::new(kernel, ray), Rise::new(kernel, ray), self.nodes());
-        AnyWalk { kernel, slabs, rise, t_max: ray.t_max, nodes, stack, n: 1, next: 0, node: 0, leaves: 0 }
+        let (slabs, spread, nodes) = (Slabs::new(kernel, ray), SpreadRay::new(kernel, ray), self.nodes());
+        AnyWalk { kernel, slabs, spread, t_max: ray.t_max, nodes, stack, n: 1, next: 0, node: 0, leaves: 0 }
     }
 
     /// Calls `visit` for the patches whose boxes the ray meets, the nearest of each node first, until the rest lie
@@ -118,7 +118,7 @@ pub(super) struct NodeLists<'t> {
 pub struct Walk<'t, K: Kernel> {
     kernel: K,
     slabs: Slabs<K>,
-    rise: Rise<K>,
+    spread: SpreadRay<K>,
     nodes: NodeLists<'t>,
     /// Nodes above the present one that have lanes left.
     stack: &'t mut [OpenNode],
@@ -145,7 +145,7 @@ impl<K: Kernel> Walk<'_, K> {
         let leaves = leaves_among(k, &self.nodes.refs[node as usize]);
         let mut end = k.min(leave, k.splat(t_max));
         if k.le(enter, end) & leaves != 0 {
-            let distance = self.nodes.plates[node as usize].distance(k, boxes, &self.rise, enter, leave);
+            let distance = self.nodes.plates[node as usize].distance(k, boxes, &self.spread, enter, leave);
             // What is not a number, in empty lanes, counts as zero.
             end = k.mul_add(k.max(distance, k.splat(0.0)), k.splat(-FAR_BEFORE), end);
         }
@@ -204,7 +204,7 @@ impl<K: Kernel> LeafWalk for Walk<'_, K> {
 pub struct AnyWalk<'t, K: Kernel> {
     kernel: K,
     slabs: Slabs<K>,
-    rise: Rise<K>,
+    spread: SpreadRay<K>,
     t_max: f32,
     nodes: NodeLists<'t>,
     /// Inner nodes to be visited, above one [`END`].
@@ -255,7 +255,7 @@ impl<K: Kernel> AnyWalk<'_, K> {
         (self.node, self.leaves) = (self.next, met & leaves);
         if self.leaves != 0 {
             let plates = &self.nodes.plates[self.next as usize];
-            self.leaves &= k.le(plates.distance(k, boxes, &self.rise, enter, leave), k.splat(0.0));
+            self.leaves &= k.le(plates.distance(k, boxes, &self.spread, enter, leave), k.splat(0.0));
         }
         if inner == 0 {
             self.n -= 1;
