@@ -4,6 +4,7 @@
 use super::{LatticeRay, Plane};
 use crate::math::simd::Kernel;
 use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
 
 /// Bytes of the head at the start of every block.
 pub const HEAD_BYTES: usize = 128;
@@ -135,6 +136,15 @@ impl Head {
         for k in 0..3 {
             (self.planes[k][lane], self.planes[k + 3][lane]) = (255, 0);
         }
+    }
+
+    /// The middle of a lane's box as it is tested, without the ray's slack.
+    #[inline(always)]
+    pub fn middle_of(&self, lane: usize) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|k| {
+            let sum = u32::from(self.planes[k][lane]) + u32::from(self.planes[k + 3][lane]);
+            f64::from(self.base[k]) + 0.5 * f64::from(sum << self.exponent[k])
+        }))
     }
 
     /// The box of a lane as it is tested, without the ray's slack.

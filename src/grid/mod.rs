@@ -33,13 +33,13 @@
 //! `horizon/` spares rays the surface that they leave, `skyline/` all the rest.
 
 mod boxes;
-mod child_plates;
 mod frame;
 mod hit;
 mod horizon;
 mod node;
 mod packet;
 mod piece;
+mod plates;
 mod ray;
 mod skyline;
 mod triangles;
@@ -49,9 +49,10 @@ pub use boxes::{CellRect, HEAD_BYTES, LaneHits, lane_mask};
 pub use hit::{LatticeHit, TriangleId};
 pub use horizon::{Borders, Horizon};
 pub use node::{NODE_BYTES, NodeView, encode_node, is_node};
-pub use packet::{PACKET, RayPacket, SeenBoxes, SeenPlate};
+pub use packet::{PACKET, RayPacket, SeenBoxes};
 use piece::leaves_below;
 pub use piece::{MAX_CELLS, MOST_PIECE_BYTES, PieceLayout, PieceView, VertexFormat};
+pub use plates::Plates;
 pub use ray::{LATTICE_LIMIT, LatticeRay, Plane};
 pub use skyline::{PartSkyline, SeenFrom, Skyline, SkylineSheet, SkylineView};
 

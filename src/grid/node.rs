@@ -1,14 +1,16 @@
 //! The node: boxes around up to 4x4 children of a patch's tree of pieces, and plates.
 
-use super::boxes::{CellRect, Head, IntegerBox, LaneBoxes, LaneHits, Slabs, lane_mask, union};
-use super::child_plates::{ChildPlates, Rise};
-use super::{HEAD_BYTES, LATTICE_LIMIT, LatticeRay};
+use super::boxes::{ALL_X, ALL_Y, ALL_Z, CellRect, Head, IntegerBox, LaneBoxes, LaneHits, Slabs, lane_mask, union};
+use super::{HEAD_BYTES, LATTICE_LIMIT, LatticeRay, Plates};
 use crate::math::simd::{self, Kernel, Task};
 use crate::math::{Bounds, Envelope};
 use glam::Vec3;
 
 /// Exact size of a node, without the words that the cache puts before it.
 pub const NODE_BYTES: usize = HEAD_BYTES + size_of::<ChildPlates>();
+
+/// The plates of lanes 0 to 7 and 8 to 15.
+pub(super) type ChildPlates = [Plates; 2];
 
 /// In place of a vertex format: a node has no vertices.
 const NO_FORMAT: u8 = 0;
@@ -59,9 +61,11 @@ fn encode(cells: CellRect, children: [u8; 2], envelopes: &[Envelope], out: &mut 
     let head: &mut Head = bytemuck::from_bytes_mut(head);
     head.set(whole, &boxes, children, cells, [0; 2], NO_FORMAT);
     children_and_lanes().filter(|(of, _)| of.bounds.is_empty()).for_each(|(_, lane)| head.turn_inside_out(lane));
-    let filled = children_and_lanes().filter(|(of, _)| !of.bounds.is_empty());
-    let plates_and_lanes = filled.map(|(of, lane)| (&of.plate, lane));
-    bytemuck::from_bytes_mut::<ChildPlates>(plates).set(whole[0], plates_and_lanes);
+    let plates: &mut ChildPlates = bytemuck::from_bytes_mut(plates);
+    for (half, plates) in plates.iter_mut().enumerate() {
+        let filled = children_and_lanes().filter(|(of, lane)| !of.bounds.is_empty() && lane / 8 == half);
+        *plates = Plates::new(filled.map(|(of, lane)| (lane % 8, &of.plate, head.middle_of(lane))));
+    }
 }
 
 /// The box rounded outwards to lattice points, and cut to the cube that vertices lie in.
@@ -141,21 +145,56 @@ impl<'b> NodeView<'b> {
     #[inline(always)]
     fn test_half<K: Kernel>(&self, k: K, through: &Through<K>, half: usize) -> (u32, K::F) {
         let (enter, leave) = through.slabs.through(k, self.head.half_of_planes(half));
-        let boxes = k.le(enter, k.min(leave, k.splat(through.t_max)));
-        (boxes & self.plates.met(k, half, &through.rise, enter, leave), enter)
+        let mut met = k.le(enter, k.min(leave, k.splat(through.t_max)));
+        if met != 0 {
+            let from_middle = through.seen_from_middles(k, self.head.half_of_planes(half));
+            let distance = self.plates[half].distance(k, from_middle, &through.direction, enter, leave);
+            met &= k.le(distance, k.splat(0.0));
+        }
+        (met, enter)
     }
 }
 
 /// What a ray makes of a node.
 struct Through<K: Kernel> {
     slabs: Slabs<K>,
-    rise: Rise<K>,
     t_max: f32,
+    /// Seen from the low corner of all boxes, each coordinate in all lanes.
+    origin: [K::F; 3],
+    direction: [K::F; 3],
+    /// Half the step between planes, towards the origin.
+    half_step: [K::F; 3],
 }
 
 impl<K: Kernel> Through<K> {
     #[inline(always)]
     fn new(k: K, node: &NodeView<'_>, ray: &LatticeRay, t_max: f32) -> Self {
-        Self { slabs: Slabs::new(k, node.head, ray), rise: node.plates.rise(k, node.head, ray), t_max }
+        let frame = node.head.frame();
+        Self {
+            slabs: Slabs::new(k, node.head, ray),
+            t_max,
+            origin: spread(k, k.sub(k.floats_twice(&ray.cell), k.floats_twice(frame))),
+            direction: spread(k, k.load(&ray.towards)),
+            half_step: spread(k, k.scaled_twice(k.splat(-0.5), frame[3])),
+        }
     }
+
+    /// Where the origin lies from the middles of eight boxes.
+    #[inline(always)]
+    fn seen_from_middles(&self, k: K, planes: &[[u8; 4]; 22]) -> [K::F; 3] {
+        let mut from = self.origin;
+        for (axis, from) in from.iter_mut().enumerate() {
+            let low: &[[u8; 4]; 2] = planes[4 * axis..4 * axis + 2].try_into().expect("two units");
+            let high: &[[u8; 4]; 2] = planes[4 * axis + 12..4 * axis + 14].try_into().expect("two units");
+            let sum = k.add(k.widen(bytemuck::cast_ref(low)), k.widen(bytemuck::cast_ref(high)));
+            *from = k.mul_add(sum, self.half_step[axis], *from);
+        }
+        from
+    }
+}
+
+/// x, y and z, each in all lanes.
+#[inline(always)]
+fn spread<K: Kernel>(k: K, x: K::F) -> [K::F; 3] {
+    [k.shuffle::<ALL_X>(x), k.shuffle::<ALL_Y>(x), k.shuffle::<ALL_Z>(x)]
 }

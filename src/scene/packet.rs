@@ -106,9 +106,8 @@ impl Task for PacketInPatch<'_, '_, '_, '_> {
         let node = NodeView::new(block.bytes());
         let mut seen = SeenBoxes::UNSET;
         let mut children = node.test_packet(kernel, packet, &mut seen);
-        let plates = node.seen_plates(packet);
         while let Some(lane) = children.pop_nearest(f32::INFINITY) {
-            let rays = seen.meeting_plate(kernel, packet, lane, &plates) & rays;
+            let rays = seen.meeting_plate(kernel, packet, lane, node) & rays;
             if rays == 0 {
                 continue;
             }

@@ -1,14 +1,15 @@
 //! Conservative boxes of parts of patches, and bounds of their heights, without evaluating them.
 
-use super::eval::{Evaluator, Point, quarter};
-use super::extent::Extent;
+use super::eval::{Evaluator, Point, quarter, sample_regular};
+use super::extent::{Extent, Reach, with_heights};
 use super::parts::Parts;
 use super::plan::{NodeId, Plan, PlanLibrary, Step};
 use super::pole::{self, MOST_REFINED, PoleHull};
 use super::products::control_points;
 use super::regular::{self, BezierWeights, ControlPoints, GridHulls, MOST_PARTS, bezier_weights};
 use super::rows::Width;
-use crate::math::simd;
+use crate::math::{Plate, simd};
+use glam::DVec3;
 
 /// Steps that a pole's hull goes deeper than others: they take little there. Below its regular quarters the ring of the
 /// last one stands out on all sides, and boxes and plates are as much too thick. Rays look up 0.94 (bigguy, trex) and
@@ -51,18 +52,19 @@ impl RangeWeights {
 }
 
 impl Evaluator {
-    /// A box that holds the part `[u0,u1] x [v0,v1]` of the patch: the Bézier hulls of its regular parts, and ring
-    /// hulls `depth` splits below the patch, or where the surface is known to lie in them.
+    /// A box that holds the part `[u0,u1] x [v0,v1]` of the patch, and heights along a normal: the Bézier hulls of its
+    /// regular parts, and ring hulls `depth` splits below the patch, or where the surface is known to lie in them.
     pub(super) fn parts_bounds(
         &mut self,
         library: &PlanLibrary,
         parts: &mut Parts,
+        normal: [i8; 3],
         u: [f64; 2],
         v: [f64; 2],
         depth: u32,
     ) -> Extent {
         let mut bounds = Extent::EMPTY;
-        self.bound_parts(library, parts, 0, u, v, depth, &mut bounds);
+        self.bound_parts(library, parts, 0, normal, [u, v], depth, &mut bounds);
         bounds
     }
 
@@ -72,33 +74,33 @@ impl Evaluator {
         library: &PlanLibrary,
         parts: &mut Parts,
         part: usize,
-        u: [f64; 2],
-        v: [f64; 2],
+        normal: [i8; 3],
+        [u, v]: [[f64; 2]; 2],
         depth: u32,
         bounds: &mut Extent,
     ) {
         if let Some(control) = parts.control(part) {
-            return self.grow_by_hull(bounds, control, u, v);
+            return self.grow_by_hull(bounds, &with_heights(control, normal), u, v);
         }
         let node = parts.node(part);
         if depth == 0 && matches!(library.plan(node), Plan::Split { in_hull: true, .. }) {
-            return parts.points(part).iter().for_each(|p| bounds.grow(*p));
+            return parts.points(part).iter().for_each(|p| bounds.grow(p.with_height(normal)));
         }
         if let (WHOLE, Some([low, high])) =
-            ([u, v], self.pole_hull(library, node, parts.points(part), depth + MORE_AT_POLES))
+            ([u, v], self.pole_hull(library, node, parts.points(part), normal, depth + MORE_AT_POLES))
         {
             bounds.grow(low);
             bounds.grow(high);
             return;
         }
         let Some(first) = parts.quarters(library, part) else {
-            let ring = self.start_ring(parts.points(part));
+            let ring = self.start_measured_ring(parts.points(part), normal);
             return self.bound(library, node, ring, u, v, depth, bounds);
         };
         for k in 0..4 {
             let (x, y) = quarter(k);
             if let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) {
-                self.bound_parts(library, parts, first + k, u, v, depth.saturating_sub(1), bounds);
+                self.bound_parts(library, parts, first + k, normal, [u, v], depth.saturating_sub(1), bounds);
             }
         }
     }
@@ -109,16 +111,24 @@ impl Evaluator {
         library: &PlanLibrary,
         node: NodeId,
         ring: &[Point],
-        u: [f64; 2],
-        v: [f64; 2],
+        normal: [i8; 3],
+        [u, v]: [[f64; 2]; 2],
         depth: u32,
     ) -> Extent {
-        let ring = self.start_ring(ring);
+        let ring = self.start_measured_ring(ring, normal);
         let mut bounds = Extent::EMPTY;
         self.bound(library, node, ring, u, v, depth, &mut bounds);
         bounds
     }
 
+    /// As `start_ring`, with heights.
+    fn start_measured_ring(&mut self, ring: &[Point], normal: [i8; 3]) -> usize {
+        self.points.clear();
+        self.points.extend(ring.iter().map(|p| p.with_height(normal)));
+        0
+    }
+
+    /// As `bound_parts` of a ring with heights.
     #[allow(clippy::too_many_arguments)]
     fn bound(
         &mut self,
@@ -162,22 +172,21 @@ impl Evaluator {
     }
 
     /// How far a part of a regular patch reaches: the Bézier hull, of the whole patch those of its four quarters, which
-    /// bulge less. (Rays look up 0.95 of what they look up with one hull at rate 8 on bigguy, 0.96 on trex.)
+    /// bulge less. (Rays look up 0.95 of what they look up with one hull at rate 8 on bigguy, 0.96 on trex.) `control`
+    /// has heights.
     pub fn regular_extent(&mut self, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) -> Extent {
         let mut extent = Extent::EMPTY;
-        if [u, v] != WHOLE {
+        if [u, v] == WHOLE {
+            let [of_u, of_v] = &mut self.hulls;
+            let quarters = simd::run(regular::QuarterHulls { control, u: of_u.get(u), v: of_v.get(v) });
+            quarters.iter().for_each(|p| extent.grow(*p));
+        } else {
             self.grow_by_hull(&mut extent, control, u, v);
-            return extent;
-        }
-        let mut quarters = [[Point::ZERO; 2]; MOST_PARTS + 2];
-        self.regular_grid_boxes(control, WHOLE, 2, &mut quarters);
-        for hull in [0, 1, MOST_PARTS, MOST_PARTS + 1].map(|quarter| quarters[quarter]) {
-            hull.into_iter().for_each(|p| extent.grow(p));
         }
         extent
     }
 
-    /// Enlarges `bounds` by the Bézier hull of a part of a regular patch.
+    /// Enlarges `bounds` by the Bézier hull of a part of a regular patch. `control` has heights.
     pub fn grow_by_hull(&mut self, bounds: &mut Extent, control: &ControlPoints, u: [f64; 2], v: [f64; 2]) {
         let [of_u, of_v] = &mut self.hulls;
         let hull = match [u, v] {
@@ -188,13 +197,13 @@ impl Evaluator {
     }
 }
 
-/// The boxes of equal parts, `MOST_PARTS` apart in each direction.
-pub(super) type GridBoxes = [[Point; 2]; MOST_PARTS * MOST_PARTS];
+/// How far equal parts reach: part (a, b) at `MOST_PARTS * b + a`.
+pub(super) type GridReaches = [Reach; MOST_PARTS * MOST_PARTS];
 
 impl Evaluator {
-    /// The boxes of `side` x `side` equal parts (1, 2 or 4) of the part `[u0,u1] x [v0,v1]` of an irregular patch,
-    /// which is the patch or a quarter of a quarter and so on; `depth` is as for each box alone. Returns whether it
-    /// could be done.
+    /// How far `side` x `side` equal parts (1, 2 or 4) of the part `[u0,u1] x [v0,v1]` of an irregular patch reach,
+    /// which is the patch or a quarter of a quarter and so on; `depth` is as for each alone. Returns whether it could
+    /// be done.
     pub(super) fn grid_of_parts(
         &mut self,
         library: &PlanLibrary,
@@ -202,7 +211,7 @@ impl Evaluator {
         [u, v]: [[f64; 2]; 2],
         side: usize,
         depth: u32,
-        out: &mut GridBoxes,
+        out: &mut GridReaches,
     ) -> bool {
         self.bound_grid(library, parts, 0, [u, v], side, depth, 0, out)
     }
@@ -218,16 +227,19 @@ impl Evaluator {
         side: usize,
         depth: u32,
         first: usize,
-        out: &mut GridBoxes,
+        out: &mut GridReaches,
     ) -> bool {
         if side == 1 {
-            let mut bounds = Extent::EMPTY;
-            self.bound_parts(library, parts, part, u, v, depth, &mut bounds);
-            out[first] = [bounds.low, bounds.high];
+            let normal = Plate::normal_along(match parts.control(part) {
+                Some(control) => normal_in_the_middle(control, u, v),
+                None => parts.normal(part),
+            });
+            out[first] = Reach { normal, ..Reach::EMPTY };
+            self.bound_parts(library, parts, part, normal, [u, v], depth, &mut out[first].extent);
             return true;
         }
         if let Some(control) = parts.control(part) {
-            self.regular_grid_boxes(control, [u, v], side, &mut out[first..]);
+            self.regular_grid_of_parts(control, [u, v], side, &mut out[first..]);
             return true;
         }
         let Some(quarters) = parts.quarters(library, part) else { return false };
@@ -248,12 +260,12 @@ impl Evaluator {
     }
 
     /// As [`grid_of_parts`](Self::grid_of_parts) for 16 control points, any rectangle, and two or four parts a side.
-    pub(super) fn regular_grid_boxes(
+    pub(super) fn regular_grid_of_parts(
         &mut self,
         control: &ControlPoints,
         [u, v]: [[f64; 2]; 2],
         side: usize,
-        out: &mut [[Point; 2]],
+        out: &mut [Reach],
     ) {
         let [of_u, of_v] = &mut self.hulls;
         let (u, v) = (of_u.get(u), of_v.get(v));
@@ -266,14 +278,22 @@ impl Evaluator {
 
 impl Evaluator {
     /// The box around a whole pole, if the node is one that has no more points than there is room for.
-    fn pole_hull(&mut self, library: &PlanLibrary, node: NodeId, points: &[Point], depth: u32) -> Option<[Point; 2]> {
+    fn pole_hull(
+        &mut self,
+        library: &PlanLibrary,
+        node: NodeId,
+        points: &[Point],
+        normal: [i8; 3],
+        depth: u32,
+    ) -> Option<[Point; 2]> {
         let Plan::Split { step: Step { pole: Some(order), .. }, in_hull: true, .. } = library.plan(node) else {
             return None;
         };
         if depth == 0 || order.len() > pole::MOST_POINTS {
             return None;
         }
-        let (store, scratch) = (library.rows(), &mut *self.pole_points.0);
+        let ring = self.start_measured_ring(points, normal);
+        let (store, scratch, points) = (library.rows(), &mut *self.pole_points.0, &self.points[ring..]);
         Some(match store.widths() {
             Width::Narrow(indices) => simd::run(PoleHull { points, ring: store.list(order, indices), depth, scratch }),
             Width::Wide(indices) => simd::run(PoleHull { points, ring: store.list(order, indices), depth, scratch }),
@@ -289,6 +309,12 @@ impl Default for PolePoints {
     fn default() -> Self {
         Self(Box::new([[Point::ZERO; MOST_REFINED]; 2]))
     }
+}
+
+/// The limit normal in the middle of a part of a regular patch, of any length.
+fn normal_in_the_middle(control: &ControlPoints, u: [f64; 2], v: [f64; 2]) -> DVec3 {
+    let sample = sample_regular(control, 0.5 * (u[0] + u[1]), 0.5 * (v[0] + v[1]));
+    sample.du.cross(sample.dv)
 }
 
 /// The part of a parameter range that lies in the lower (0) or upper (1) half, as the half sees it. Where a range only

@@ -10,8 +10,8 @@
 //! the guard and the other just outside, they still agree: the owner's value lies within the evaluation error, far less
 //! than the guard, of one that is a whole guard away from the boundary.
 
-use super::eval::{Evaluator, Point, SurfaceSample};
-use super::extent::Extent;
+use super::eval::{Evaluator, SurfaceSample};
+use super::extent::{Extent, Reach};
 use super::regular::MOST_PARTS;
 use super::surface::{PatchPoints, Surface};
 use crate::ids::{FaceId, PatchId};
@@ -309,13 +309,6 @@ impl Dicer {
         lane
     }
 
-    /// As [`load`](Self::load), with the heights of points.
-    fn load_with_heights(&mut self, surface: &Surface, patch: PatchId) -> usize {
-        let lane = patch.idx() % N_REMEMBERED;
-        surface.load_with_heights(patch, &mut self.points[lane]);
-        lane
-    }
-
     /// Position and tangents at a point of a patch, in lattice units without [`LATTICE_SHIFT`].
     pub fn sample(&mut self, surface: &Surface, patch: PatchId, u: f64, v: f64) -> SurfaceSample {
         let lane = self.load(surface, patch);
@@ -329,7 +322,7 @@ impl Dicer {
     }
 
     /// What holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing; `depth` more
-    /// splits towards irregular corners make it tighter. All plates of a patch are across its middle normal.
+    /// splits towards irregular corners make it tighter. The plate is across the normal in the middle of the cells.
     pub fn envelope(
         &mut self,
         surface: &Surface,
@@ -339,11 +332,39 @@ impl Dicer {
         j: [u32; 2],
         depth: u32,
     ) -> Envelope {
-        let lane = self.load_with_heights(surface, patch);
+        let lane = self.load(surface, patch);
+        let [u, v] = [range(i, rates.n_u), range(j, rates.n_v)];
+        let normal = surface.normal_of_part(&mut self.points[lane], &mut self.evaluator, u, v);
+        in_lattice(normal, &self.extent(surface, patch, rates, normal, [i, j], depth))
+    }
+
+    /// The box of [`envelope`](Self::envelope) alone.
+    pub fn bounds(
+        &mut self,
+        surface: &Surface,
+        patch: PatchId,
+        rates: &PatchRates,
+        i: [u32; 2],
+        j: [u32; 2],
+        depth: u32,
+    ) -> Bounds {
+        to_lattice_box(&self.extent(surface, patch, rates, [0; 3], [i, j], depth))
+    }
+
+    /// How far cells reach, and how high along a normal, where sides move their vertices to, too.
+    fn extent(
+        &mut self,
+        surface: &Surface,
+        patch: PatchId,
+        rates: &PatchRates,
+        normal: [i8; 3],
+        [i, j]: [[u32; 2]; 2],
+        depth: u32,
+    ) -> Extent {
+        let lane = self.load(surface, patch);
         let points = &mut self.points[lane];
-        let range = |[a, b]: [u32; 2], n: u32| [f64::from(a) / f64::from(n), f64::from(b) / f64::from(n)];
         let (u, v) = (range(i, rates.n_u), range(j, rates.n_v));
-        let mut extent = surface.bounds(points, &mut self.evaluator, u, v, depth);
+        let mut extent = surface.extent(points, &mut self.evaluator, normal, u, v, depth);
         let snap = |[a, b]: [u32; 2], n: u32, r: u32| range([snapped(a, n, r), snapped(b, n, r)], r);
         for side in 0..4 {
             let (touches, n, along) = match side {
@@ -363,10 +384,10 @@ impl Dicer {
                     2 => (t, [1.0; 2]),
                     _ => ([0.0; 2], t),
                 };
-                extent = extent.union(surface.bounds(points, &mut self.evaluator, u, v, depth));
+                extent = extent.union(surface.extent(points, &mut self.evaluator, normal, u, v, depth));
             }
         }
-        in_lattice(points.normal(), &extent)
+        extent
     }
 
     /// Appends the [envelopes](Self::envelope) of `n[0]` x `n[1]` parts of `side` x `side` cells from (`from[0]`,
@@ -390,27 +411,31 @@ impl Dicer {
         if !is_plain || !is_whole || n[0] != n[1] || ![2, 4].contains(&n[0]) {
             return false;
         }
-        let lane = self.load_with_heights(surface, patch);
-        let at = |k: usize, i: u32| f64::from(i) / f64::from(cells[k]);
-        let rectangle = [0, 1].map(|k| [at(k, from[k]), at(k, from[k] + n[k] * side)]);
+        let lane = self.load(surface, patch);
+        let rectangle = [0, 1].map(|k| range([from[k], from[k] + n[k] * side], cells[k]));
         let n = n[0] as usize;
-        let mut boxes = [[Point::ZERO; 2]; MOST_PARTS * MOST_PARTS];
+        let mut reaches = [Reach::EMPTY; MOST_PARTS * MOST_PARTS];
         let points = &mut self.points[lane];
-        if !surface.grid_boxes(points, &mut self.evaluator, rectangle, n, depth, &mut boxes) {
+        if !surface.grid_of_parts(points, &mut self.evaluator, rectangle, n, depth, &mut reaches) {
             return false;
         }
-        let boxes = boxes.chunks_exact(MOST_PARTS).take(n).flat_map(|row| &row[..n]);
-        out.extend(boxes.map(|&[low, high]| in_lattice(points.normal(), &Extent { low, high })));
+        let reaches = reaches.chunks_exact(MOST_PARTS).take(n).flat_map(|row| &row[..n]);
+        out.extend(reaches.map(|Reach { extent, normal }| in_lattice(*normal, extent)));
         true
     }
 
     /// As [`envelope`](Self::envelope) for a whole patch at any rates.
     pub fn patch_envelope(&mut self, surface: &Surface, patch: PatchId, depth: u32) -> Envelope {
-        let lane = self.load_with_heights(surface, patch);
-        let points = &mut self.points[lane];
-        let extent = surface.bounds(points, &mut self.evaluator, [0.0, 1.0], [0.0, 1.0], depth);
-        in_lattice(points.normal(), &extent)
+        let lane = self.load(surface, patch);
+        let (points, evaluator, whole) = (&mut self.points[lane], &mut self.evaluator, [0.0, 1.0]);
+        let normal = surface.normal_of_part(points, evaluator, whole, whole);
+        in_lattice(normal, &surface.extent(points, evaluator, normal, whole, whole, depth))
     }
+}
+
+/// The parameters of cells.
+fn range([a, b]: [u32; 2], n: u32) -> [f64; 2] {
+    [f64::from(a) / f64::from(n), f64::from(b) / f64::from(n)]
 }
 
 /// What vertices of a surface that reaches so far lie in.
@@ -541,7 +566,6 @@ mod tests {
         for mesh in shapes::all().into_iter().map(|(_, mesh)| mesh).chain((0..60).map(random_mesh)) {
             let surface = Surface::new(&mesh, 1).unwrap();
             for patch in surface.visible_patches() {
-                // Before and after there are points without heights.
                 let Envelope { bounds, plate } = dicer.patch_envelope(&surface, patch, 3);
                 let rates = surface.uniform_rates(patch, 1 + patch.0 % 9);
                 dicer.dice(&surface, patch, &rates, [0, rates.n_u], [0, rates.n_v], &mut grid);

@@ -13,8 +13,8 @@ use glam::DVec3;
 use std::ops::{Add, Mul, Sub};
 
 /// A point in lattice space, in four lanes so that sums compile to vector instructions. The fourth one is the point's
-/// **height** along the [normal](crate::math::Plate::normal) that its patch is measured by, if it is: sums of points
-/// keep it as they keep coordinates.
+/// **height** along a [normal](crate::math::Plate::normal), where it has been measured: sums of points keep it as they
+/// keep coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]
 pub struct Point(pub [f64; 4]);

@@ -1,6 +1,7 @@
-//! How far points reach.
+//! How far points reach, and how high.
 
 use super::eval::Point;
+use super::regular::ControlPoints;
 use crate::math::DBounds;
 
 /// The least and the greatest coordinates of some points, and heights.
@@ -37,4 +38,37 @@ impl Extent {
     pub fn bounds(&self) -> DBounds {
         DBounds { min: self.low.to_vec(), max: self.high.to_vec() }
     }
+}
+
+/// How far a part of a patch reaches, with heights along a normal of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach {
+    /// How far, and how high.
+    pub extent: Extent,
+    /// What heights are measured along; zero where there is none.
+    pub normal: [i8; 3],
+}
+
+impl Reach {
+    /// That of no point.
+    pub const EMPTY: Self = Self { extent: Extent::EMPTY, normal: [0; 3] };
+}
+
+impl Point {
+    /// The point with its height along a normal.
+    #[inline(always)]
+    pub fn with_height(self, normal: [i8; 3]) -> Self {
+        let ([x, y, z, _], [a, b, c]) = (self.0, normal.map(f64::from));
+        Point([x, y, z, a * x + b * y + c * z])
+    }
+}
+
+/// Control points with their heights along a normal.
+#[inline(always)]
+pub fn with_heights(control: &ControlPoints, normal: [i8; 3]) -> ControlPoints {
+    let mut out = *control;
+    for point in &mut out {
+        *point = point.with_height(normal);
+    }
+    out
 }

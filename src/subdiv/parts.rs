@@ -7,6 +7,13 @@ use super::eval::Point;
 use super::plan::{Child, NodeId, Plan, PlanLibrary};
 use super::products::{control_points, push_listed_control, refined_points};
 use super::regular::ControlPoints;
+use glam::DVec3;
+
+/// Across a quad, of any length: on the side from which it is counter-clockwise.
+#[inline(always)]
+pub fn across([a, b, c, d]: [DVec3; 4]) -> DVec3 {
+    (c - a).cross(d - b)
+}
 
 /// Parts that are kept. A corner needs four a level, a crease four times as many on each level; what is beyond is found
 /// again each time.
@@ -41,11 +48,6 @@ impl Parts {
         &mut self.points
     }
 
-    /// The new ring, as far as it has been put here.
-    pub fn ring_mut(&mut self) -> &mut [Point] {
-        &mut self.points
-    }
-
     /// The patch of the ring starts at `node`.
     pub fn begin(&mut self, library: &PlanLibrary, node: NodeId) {
         let part = Part { node, first: 0, n_points: self.points.len() as u32, is_regular: false, quarters: 0 };
@@ -73,6 +75,12 @@ impl Parts {
     pub fn points(&self, part: usize) -> &[Point] {
         let Part { first, n_points, .. } = self.parts[part];
         &self.points[first as usize..][..n_points as usize]
+    }
+
+    /// Across the quad of an irregular part's corners, which are the first points of its ring, of any length. (A face
+    /// that meets itself may have fewer points.)
+    pub fn normal(&self, part: usize) -> DVec3 {
+        self.points(part).first_chunk().map_or(DVec3::ZERO, |corners| across(corners.map(Point::to_vec)))
     }
 
     /// The first of an irregular part's four quarters, which follow each other; `None` if there are too many parts.

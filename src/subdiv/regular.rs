@@ -1,9 +1,12 @@
 //! Uniform bicubic B-spline patches: evaluation, derivatives, and the Bézier hull of a part.
 
 use super::eval::Point;
-use crate::math::PointGrid;
+use super::extent::{Extent, Reach};
+use super::parts::across;
 use crate::math::point_grid::LANES;
 use crate::math::simd::{self, Kernel, Task};
+use crate::math::{Plate, PointGrid};
+use glam::DVec3;
 
 /// 16 control points, u fastest; the patch lies between `[5]`, `[6]`, `[9]` and `[10]`.
 pub type ControlPoints = [Point; 16];
@@ -333,15 +336,24 @@ impl Task for WholeHull<'_> {
 /// Parts along a side that [`GridHulls`] has at most.
 pub(super) const MOST_PARTS: usize = 4;
 
-/// The boxes of `SIDE` x `SIDE` equal parts (2 or 4 a side) of a rectangle of a regular patch: each around the part's
-/// Bézier points. Those of the rectangle are halved, so that parts share what they have in common.
+/// How far `SIDE` x `SIDE` equal parts (2 or 4 a side) of a rectangle of a regular patch reach: each part's Bézier
+/// points, with heights across its corners. Those of the rectangle are halved, so that parts share what they have in
+/// common.
 pub(super) struct GridHulls<'a, const SIDE: usize> {
     pub control: &'a ControlPoints,
     /// Of the rectangle.
     pub u: &'a BezierWeights,
     pub v: &'a BezierWeights,
-    /// Box of part (a, b) at `MOST_PARTS * b + a`: [low, high].
-    pub out: &'a mut [[Point; 2]],
+    /// Part (a, b) at `MOST_PARTS * b + a`.
+    pub out: &'a mut [Reach],
+}
+
+/// How far the quarters of a patch reach together: low, high. Heights are those of the control points.
+pub(super) struct QuarterHulls<'a> {
+    pub control: &'a ControlPoints,
+    /// Of the whole patch.
+    pub u: &'a BezierWeights,
+    pub v: &'a BezierWeights,
 }
 
 /// The Bézier points of `SIDE` equal parts of a segment, from its B-spline points.
@@ -384,54 +396,108 @@ fn middle<K: Kernel>(k: K, a: K::D, b: K::D) -> K::D {
     k.mul4(k.add4(a, b), k.splat4(0.5))
 }
 
-/// The boxes around four points in a row, for each of `SIDE` parts.
+/// Columns of Bézier points of `SIDE` parts along v: column i of part b at `[i][b]`.
 #[inline(always)]
-fn row_boxes<K: Kernel, const SIDE: usize>(k: K, u: &BezierWeights, points: [K::D; 4]) -> [[K::D; 2]; SIDE] {
-    let mut out = [[points[0]; 2]; SIDE];
-    for (out, [p, q, r, s]) in out.iter_mut().zip(split_points::<K, SIDE>(k, u, points)) {
-        *out = [k.min4(k.min4(p, q), k.min4(r, s)), k.max4(k.max4(p, q), k.max4(r, s))];
+fn split_columns<K: Kernel, const SIDE: usize>(k: K, v: &BezierWeights, c: &ControlPoints) -> [[[K::D; 4]; SIDE]; 4] {
+    let mut columns = [[[k.splat4(0.0); 4]; SIDE]; 4];
+    for (i, column) in columns.iter_mut().enumerate() {
+        let c = [k.load4(&c[i].0), k.load4(&c[4 + i].0), k.load4(&c[8 + i].0), k.load4(&c[12 + i].0)];
+        *column = split_points::<K, SIDE>(k, v, c);
     }
-    out
+    columns
 }
 
+/// Four points in a row, for each of `SIDE` parts.
+type Row<K, const SIDE: usize> = [[<K as Kernel>::D; 4]; SIDE];
+
+/// Row `j` of the parts `b` along v.
 #[inline(always)]
-fn union_of_boxes<K: Kernel, const SIDE: usize>(k: K, a: &mut [[K::D; 2]; SIDE], b: &[[K::D; 2]; SIDE]) {
-    for (a, b) in a.iter_mut().zip(b) {
-        *a = [k.min4(a[0], b[0]), k.max4(a[1], b[1])];
+fn row<K: Kernel, const SIDE: usize>(
+    k: K,
+    u: &BezierWeights,
+    [c0, c1, c2, c3]: &[[[K::D; 4]; SIDE]; 4],
+    b: usize,
+    j: usize,
+) -> Row<K, SIDE> {
+    split_points::<K, SIDE>(k, u, [c0[b][j], c1[b][j], c2[b][j], c3[b][j]])
+}
+
+/// The least and the greatest of four points, each coordinate by itself.
+#[inline(always)]
+fn ends_of_row<K: Kernel>(k: K, [p, q, r, s]: [K::D; 4]) -> (K::D, K::D) {
+    (k.min4(k.min4(p, q), k.min4(r, s)), k.max4(k.max4(p, q), k.max4(r, s)))
+}
+
+/// How far 16 points reach, with heights across their corners.
+#[inline(always)]
+fn reach<K: Kernel>(k: K, rows: [[K::D; 4]; 4]) -> Reach {
+    let (mut low, mut high) = ends_of_row(k, rows[0]);
+    for row in &rows[1..] {
+        let (l, h) = ends_of_row(k, *row);
+        (low, high) = (k.min4(low, l), k.max4(high, h));
     }
+    let mut corners = [DVec3::ZERO; 4];
+    for (corner, p) in corners.iter_mut().zip([rows[0][0], rows[0][3], rows[3][3], rows[3][0]]) {
+        let [x, y, z, _] = k.store4(p);
+        *corner = DVec3::new(x, y, z);
+    }
+    let normal = Plate::normal_along(across(corners));
+    let [a, b, c] = normal;
+    let [a, b, c] = [k.splat4(f64::from(a)), k.splat4(f64::from(b)), k.splat4(f64::from(c))];
+    let (mut lowest, mut highest) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
+    for row in rows {
+        let [x, y, z, _] = k.transpose4(row);
+        let heights = k.add4(k.add4(k.mul4(x, a), k.mul4(y, b)), k.mul4(z, c));
+        (lowest, highest) = (k.min4(lowest, heights), k.max4(highest, heights));
+    }
+    let (mut low, mut high) = (Point(k.store4(low)), Point(k.store4(high)));
+    let [p, q, r, s] = k.store4(lowest);
+    low.0[3] = p.min(q).min(r.min(s));
+    let [p, q, r, s] = k.store4(highest);
+    high.0[3] = p.max(q).max(r.max(s));
+    Reach { extent: Extent { low, high }, normal }
 }
 
 impl<const SIDE: usize> Task for GridHulls<'_, SIDE> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) {
-        let Self { control: c, u, v, out } = self;
-        let mut columns = [[[k.splat4(0.0); 4]; SIDE]; 4];
-        for (i, column) in columns.iter_mut().enumerate() {
-            let c = [k.load4(&c[i].0), k.load4(&c[4 + i].0), k.load4(&c[8 + i].0), k.load4(&c[12 + i].0)];
-            *column = split_points::<K, SIDE>(k, v, c);
-        }
-        let [c0, c1, c2, c3] = &columns;
+        let Self { control, u, v, out } = self;
+        let columns = split_columns::<K, SIDE>(k, v, control);
         // The last row of one part is the first of the next one.
-        let mut first = row_boxes::<K, SIDE>(k, u, [c0[0][0], c1[0][0], c2[0][0], c3[0][0]]);
+        let mut first = row(k, u, &columns, 0, 0);
         for b in 0..SIDE {
-            let last = row_boxes::<K, SIDE>(k, u, [c0[b][3], c1[b][3], c2[b][3], c3[b][3]]);
-            let mut boxes = first;
-            union_of_boxes(k, &mut boxes, &last);
-            for j in 1..3 {
-                let row = row_boxes::<K, SIDE>(k, u, [c0[b][j], c1[b][j], c2[b][j], c3[b][j]]);
-                union_of_boxes(k, &mut boxes, &row);
-            }
-            for (out, [low, high]) in out[MOST_PARTS * b..].iter_mut().zip(boxes) {
-                *out = [Point(k.store4(low)), Point(k.store4(high))];
+            let last = row(k, u, &columns, b, 3);
+            let (second, third) = (row(k, u, &columns, b, 1), row(k, u, &columns, b, 2));
+            for (a, out) in out[MOST_PARTS * b..].iter_mut().take(SIDE).enumerate() {
+                *out = reach(k, [first[a], second[a], third[a], last[a]]);
             }
             first = last;
         }
     }
 }
 
+impl Task for QuarterHulls<'_> {
+    type Output = [Point; 2];
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) -> [Point; 2] {
+        let columns = split_columns::<K, 2>(k, self.v, self.control);
+        let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
+        // The last row of the first part is the first of the other.
+        for (b, j) in [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3)] {
+            let row: Row<K, 2> = row(k, self.u, &columns, b, j);
+            for points in row {
+                let (l, h) = ends_of_row(k, points);
+                (low, high) = (k.min4(low, l), k.max4(high, h));
+            }
+        }
+        [Point(k.store4(low)), Point(k.store4(high))]
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::extent::with_heights;
     use super::*;
     use crate::math::simd::run;
 
@@ -496,26 +562,25 @@ mod tests {
     }
 
     #[test]
-    fn the_boxes_of_a_grid_are_those_of_its_parts() {
+    fn a_grid_reaches_as_far_as_its_parts() {
         let c = control_points();
         for (side, u, v) in [(2, [0.5, 0.75], [0.0, 1.0]), (4, [0.0, 1.0], [0.0, 0.5])] {
-            let mut out = [[Point::ZERO; 2]; MOST_PARTS * MOST_PARTS];
-            let (control, of_u, of_v, boxes) = (&c, &bezier_weights(u), &bezier_weights(v), &mut out[..]);
+            let mut out = [Reach::EMPTY; MOST_PARTS * MOST_PARTS];
+            let (control, of_u, of_v, reaches) = (&c, &bezier_weights(u), &bezier_weights(v), &mut out[..]);
             match side {
-                2 => run(GridHulls::<2> { control, u: of_u, v: of_v, out: boxes }),
-                _ => run(GridHulls::<4> { control, u: of_u, v: of_v, out: boxes }),
+                2 => run(GridHulls::<2> { control, u: of_u, v: of_v, out: reaches }),
+                _ => run(GridHulls::<4> { control, u: of_u, v: of_v, out: reaches }),
             }
             for (a, b) in (0..side).flat_map(|b| (0..side).map(move |a| (a, b))) {
                 let part = |[low, high]: [f64; 2], i: usize| {
                     let step = (high - low) / side as f64;
                     bezier_weights([low + step * i as f64, low + step * (i + 1) as f64])
                 };
-                let expected = run(Hull { control: &c, u: &part(u, a), v: &part(v, b) });
-                let hull = out[MOST_PARTS * b + a];
-                assert!(
-                    (0..2).all(|k| (hull[k] - expected[k]).max_abs() < 1e-14),
-                    "{side} {a} {b}: {hull:?} {expected:?}"
-                );
+                let Reach { extent: Extent { low, high }, normal } = out[MOST_PARTS * b + a];
+                let control = with_heights(&c, normal);
+                let expected = run(Hull { control: &control, u: &part(u, a), v: &part(v, b) });
+                let far = (low - expected[0]).max_abs().max((high - expected[1]).max_abs());
+                assert!(far < 1e-12, "{side} {a} {b}: {low:?} {high:?} {expected:?}");
             }
         }
     }

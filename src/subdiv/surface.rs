@@ -1,12 +1,12 @@
 //! One mesh ready for evaluation: topology, control points in lattice units, and the plan of every face.
 
-use super::bounds::GridBoxes;
+use super::bounds::GridReaches;
 use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, sample_regular};
-use super::extent::Extent;
+use super::extent::{Extent, with_heights};
 use super::kinds::plan_faces;
 use super::local::RingWalker;
-use super::parts::Parts;
+use super::parts::{Parts, across};
 use super::plan::{NodeId, PlanLibrary};
 use super::regular::ControlPoints;
 use super::route::RouteWalker;
@@ -86,8 +86,6 @@ pub struct Surface {
 pub struct PatchPoints {
     /// The surface and the patch.
     of: Option<(u64, PatchId)>,
-    /// What the heights of points are measured along, if they are; zero for patches under edits.
-    normal: Option<[i8; 3]>,
     node: NodeId,
     control: ControlPoints,
     parts: Parts,
@@ -119,9 +117,13 @@ impl Walker {
 }
 
 impl PatchPoints {
-    /// What heights are measured along; zero if they are not known.
-    pub fn normal(&self) -> [i8; 3] {
-        self.normal.unwrap_or_default()
+    /// The control points, if the patch is regular.
+    fn regular_control(&self) -> Option<&ControlPoints> {
+        match self.node {
+            REGULAR => Some(&self.control),
+            EDITED => None,
+            _ => self.parts.control(0),
+        }
     }
 }
 
@@ -129,7 +131,6 @@ impl Default for PatchPoints {
     fn default() -> Self {
         Self {
             of: None,
-            normal: None,
             node: REGULAR,
             control: [Point::ZERO; 16],
             parts: Parts::default(),
@@ -280,30 +281,18 @@ impl Surface {
     #[inline]
     pub fn load(&self, patch: PatchId, points: &mut PatchPoints) {
         if points.of != Some((self.id, patch)) {
-            self.fetch(patch, points, false);
+            self.fetch(patch, points);
         }
     }
 
-    /// As [`load`](Self::load), with the heights of points.
-    pub fn load_with_heights(&self, patch: PatchId, points: &mut PatchPoints) {
-        if points.of == Some((self.id, patch)) && points.normal.is_some() {
-            return;
-        }
-        self.fetch(patch, points, true);
-    }
-
-    fn fetch(&self, patch: PatchId, points: &mut PatchPoints, has_heights: bool) {
-        (points.of, points.normal) = (Some((self.id, patch)), has_heights.then_some([0; 3]));
+    fn fetch(&self, patch: PatchId, points: &mut PatchPoints) {
+        points.of = Some((self.id, patch));
         let (face, sub) = self.face_of(patch);
         let (first, size) = self.topology.face_corners(face.0);
         points.node = self.plan_of_face[face.idx()];
         if points.node == REGULAR {
             for (point, vertex) in points.control.iter_mut().zip(regular_ring(&self.topology, first)) {
                 *point = self.control_point(vertex);
-            }
-            if has_heights {
-                let corners = limit_corners(&points.control);
-                points.normal = Some(measure_heights(&mut points.control, corners));
             }
             return;
         }
@@ -318,13 +307,6 @@ impl Surface {
             let parent = &points.polygon;
             let ring = points.parts.new_ring();
             points.node = Evaluator::child_ring(&self.plans, points.node, parent, sub as usize, ring);
-        }
-        if has_heights {
-            // Before there are any parts.
-            let ring = points.parts.ring_mut();
-            // A face that meets itself may have fewer points.
-            let corners = ring.first_chunk().copied().unwrap_or([Point::ZERO; 4]);
-            points.normal = Some(measure_heights(ring, corners));
         }
         points.parts.begin(&self.plans, points.node);
     }
@@ -384,40 +366,58 @@ impl Surface {
         if sample.kind == SampleKind::PositionOnly { DVec3::ZERO } else { sample.du.cross(sample.dv) }
     }
 
-    /// How far part of a patch reaches, in lattice units; see `Evaluator::parts_bounds`. Heights are right if they were
-    /// [loaded](Self::load_with_heights).
-    pub fn bounds(
+    /// The normal to measure the heights of part of a patch along: across its limit corners or those of its control
+    /// points, or the limit normal in the middle of what is no whole patch.
+    pub fn normal_of_part(
         &self,
         points: &mut PatchPoints,
         evaluator: &mut Evaluator,
         u: [f64; 2],
         v: [f64; 2],
+    ) -> [i8; 3] {
+        let is_whole = [u, v] == [[0.0, 1.0]; 2] && points.node != EDITED;
+        Plate::normal_along(match points.regular_control() {
+            _ if !is_whole => self.normal(points, evaluator, 0.5 * (u[0] + u[1]), 0.5 * (v[0] + v[1])),
+            Some(control) => across(limit_corners(control).map(Point::to_vec)),
+            None => points.parts.normal(0),
+        })
+    }
+
+    /// How far part of a patch reaches, in lattice units, and how high along a normal; see `Evaluator::parts_bounds`.
+    #[allow(clippy::too_many_arguments)]
+    pub fn extent(
+        &self,
+        points: &mut PatchPoints,
+        evaluator: &mut Evaluator,
+        normal: [i8; 3],
+        u: [f64; 2],
+        v: [f64; 2],
         depth: u32,
     ) -> Extent {
         if points.node == REGULAR {
-            evaluator.regular_extent(&points.control, u, v)
+            evaluator.regular_extent(&with_heights(&points.control, normal), u, v)
         } else if let Some(tree) = self.tree(points) {
-            evaluator.edited_bounds(&self.plans, tree, u, v, depth)
+            evaluator.edited_bounds(&self.plans, tree, normal, [u, v], depth)
         } else {
-            evaluator.parts_bounds(&self.plans, &mut points.parts, u, v, depth)
+            evaluator.parts_bounds(&self.plans, &mut points.parts, normal, u, v, depth)
         }
     }
 }
 
 impl Surface {
-    /// The boxes of `side` x `side` equal parts of a rectangle of parameters, in lattice units, where they can be had
-    /// together; see `Evaluator::grid_of_parts`. Returns whether that is so.
-    pub(super) fn grid_boxes(
+    /// How far `side` x `side` equal parts of a rectangle of parameters reach, in lattice units, where that can be had
+    /// together; see `Evaluator::grid_of_parts`. Returns whether it can.
+    pub(super) fn grid_of_parts(
         &self,
         points: &mut PatchPoints,
         evaluator: &mut Evaluator,
         rectangle: [[f64; 2]; 2],
         side: usize,
         depth: u32,
-        out: &mut GridBoxes,
+        out: &mut GridReaches,
     ) -> bool {
         if points.node == REGULAR {
-            evaluator.regular_grid_boxes(&points.control, rectangle, side, out);
+            evaluator.regular_grid_of_parts(&points.control, rectangle, side, out);
             return true;
         }
         points.node != EDITED && evaluator.grid_of_parts(&self.plans, &mut points.parts, rectangle, side, depth, out)
@@ -442,17 +442,6 @@ fn limit_corners(control: &ControlPoints) -> [Point; 4] {
     let along_v = |i: usize, j: usize| control[4 * j + i] + control[4 * j + 4 + i] * 4.0 + control[4 * j + 8 + i];
     let corner = |i: usize, j: usize| along_v(i, j) + along_v(i + 1, j) * 4.0 + along_v(i + 2, j);
     [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)]
-}
-
-/// Gives points their heights along the normal of the quad with these corners, in turn, and returns that.
-fn measure_heights(points: &mut [Point], corners: [Point; 4]) -> [i8; 3] {
-    let [a, b, c, d] = corners.map(Point::to_vec);
-    let normal = Plate::normal_along((c - a).cross(d - b));
-    let [x, y, z] = normal.map(f64::from);
-    for Point(p) in points {
-        p[3] = x * p[0] + y * p[1] + z * p[2];
-    }
-    normal
 }
 
 /// Where in a regular ring the vertices at corner `k` go: itself, then across its edge and on counter-clockwise.

@@ -2,7 +2,6 @@
 
 use super::{PACKET, RayPacket};
 use crate::grid::boxes::{ALL_X, ALL_Y, ALL_Z, Head, LaneHits};
-use crate::grid::child_plates::SeenPlates;
 use crate::grid::{NodeView, Plane};
 use crate::math::simd::Kernel;
 
@@ -25,11 +24,10 @@ impl SeenBoxes {
         packet.meeting(k, near, far)
     }
 
-    /// Those of them that meet the plate of the lane within the box.
+    /// Those of them that meet the plate of a node's child within the box.
     #[inline(always)]
-    pub fn meeting_plate<K: Kernel>(&self, k: K, packet: &RayPacket, lane: usize, plates: &SeenPlates<'_>) -> u32 {
-        let [near, far] = self.lane(lane);
-        packet.meeting_plate(k, near, far, &plates.get(lane))
+    pub fn meeting_plate<K: Kernel>(&self, k: K, packet: &RayPacket, lane: usize, node: NodeView<'_>) -> u32 {
+        packet.meeting_plate(k, self.lane(lane), &node.plates[lane / 8 % 2], lane % 8)
     }
 
     /// The planes of a lane.
@@ -41,12 +39,6 @@ impl SeenBoxes {
 }
 
 impl NodeView<'_> {
-    /// The plates of children as rays of a packet see them.
-    #[inline(always)]
-    pub fn seen_plates(&self, packet: &RayPacket) -> SeenPlates<'_> {
-        self.plates.seen_from(self.head.base, packet.origin())
-    }
-
     /// The children whose boxes some ray of a packet may meet, and where at least, if no ray had an end; `seen`
     /// receives their boxes.
     #[inline(always)]

@@ -30,6 +30,7 @@
 mod boxes;
 mod triangles;
 
+use super::plates::{Plates, SeenPlate};
 use super::ray::{
     Axis, LatticeRay, Plane, Sides, caller_t, is_ordinary_direction, is_ordinary_origin, power_of_two_of,
     reciprocal_of_power,
@@ -135,13 +136,6 @@ impl RayPacket {
         k.le(enter, leave)
     }
 
-    /// The lattice point nearest to the origin of all rays.
-    #[inline(always)]
-    pub fn origin(&self) -> [i32; 3] {
-        let [x, y, z, _] = self.first.cell;
-        [x, y, z]
-    }
-
     /// The first ray, whose origin and axes are those of all.
     #[inline(always)]
     pub(super) fn first(&self) -> &LatticeRay {
@@ -210,17 +204,20 @@ impl RayPacket {
         k.le(enter, k.min(leave, k.load(&self.t_max)))
     }
 
-    /// Those of them that meet a plate within the box.
+    /// Those of them that meet a lane's plate within the box.
     #[inline(always)]
-    pub fn meeting_plate<K: Kernel>(&self, k: K, near: [f32; 3], far: [f32; 3], plate: &SeenPlate) -> u32 {
+    pub fn meeting_plate<K: Kernel>(&self, k: K, [near, far]: [[f32; 3]; 2], plates: &Plates, lane: usize) -> u32 {
         let (enter, leave) = self.through(k, near, far);
         let boxes = k.le(enter, k.min(leave, k.load(&self.t_max)));
-        let (mut slope, start) = (k.splat(0.0), k.splat(plate.start));
-        for (of_axis, normal) in self.towards.iter().zip(plate.normal) {
+        // Origins are moved for near and far planes by as much to either side.
+        let from_middle = [0, 1, 2].map(|axis| -0.5 * (near[axis] + far[axis]));
+        let SeenPlate { normal, start, half } = plates.seen(lane, from_middle);
+        let (mut slope, start, half) = (k.splat(0.0), k.splat(start), k.splat(half));
+        for (of_axis, normal) in self.towards.iter().zip(normal) {
             slope = k.mul_add(k.splat(normal), k.load(of_axis), slope);
         }
         let (first, last) = (k.mul_add(enter, slope, start), k.mul_add(leave, slope, start));
-        boxes & k.le(k.min(first, last), k.splat(plate.high)) & k.le(k.splat(plate.low), k.max(first, last))
+        boxes & k.le(k.min(first, last), half) & k.le(k.sub(k.splat(-0.0), half), k.max(first, last))
     }
 
     /// Where rays enter a box, at 0 or later, and where they leave it.
@@ -234,19 +231,6 @@ impl RayPacket {
         }
         (enter, leave)
     }
-}
-
-/// A plate as the rays of a packet see it: heights above any one point, in lengths of the normal.
-#[derive(Clone, Copy, Debug)]
-pub struct SeenPlate {
-    /// Across the plate.
-    pub normal: [f32; 3],
-    /// The height of the rays' origin.
-    pub start: f32,
-    /// The least height in the plate, with its [margin](crate::math::Plate::margin).
-    pub low: f32,
-    /// The greatest one.
-    pub high: f32,
 }
 
 /// Directions made ready for a lattice, as for [`LatticeRay`].

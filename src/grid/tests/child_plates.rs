@@ -16,7 +16,9 @@ fn sheets(random: &mut Random, n: usize, size: f64) -> Vec<[DVec3; 3]> {
     (0..n).map(|_| corner(middle)).collect::<Vec<_>>().into_iter().map(|p| [(); 3].map(|()| corner(p))).collect()
 }
 
-fn envelope(normal: [i8; 3], corners: &[DVec3; 3]) -> Envelope {
+fn envelope(has_normal: bool, corners: &[DVec3; 3]) -> Envelope {
+    let [a, b, c] = *corners;
+    let normal = if has_normal { Plate::normal_along((b - a).cross(c - a)) } else { [0; 3] };
     let heights = corners.map(|p| Plate::height(normal, p));
     let [low, high] = [heights.into_iter().fold(f64::MAX, f64::min), heights.into_iter().fold(f64::MIN, f64::max)];
     Envelope {
@@ -41,8 +43,8 @@ impl Task for Met<'_> {
         let origin = k.load4(&[origin.x, origin.y, origin.z, 0.0]);
         let is_packet = packet.set(k, origin, &along, &[t_max; PACKET]);
         let of_packet = is_packet.then(|| {
-            let (met, plates) = (node.test_packet(k, &packet, &mut seen).mask, node.seen_plates(&packet));
-            let is_met = |lane: &u32| seen.meeting_plate(k, &packet, *lane as usize, &plates) & 1 == 1;
+            let met = node.test_packet(k, &packet, &mut seen).mask;
+            let is_met = |lane: &u32| seen.meeting_plate(k, &packet, *lane as usize, node) & 1 == 1;
             (0..16).filter(|lane| met >> lane & 1 == 1).filter(is_met).map(|lane| 1 << lane).sum()
         });
         [Some(closest), Some(any), of_packet]
@@ -57,9 +59,7 @@ fn no_child_that_a_ray_hits_is_hidden_and_some_that_it_passes_are() {
         let size = [30.0, 3e3, 2e5, 6e6][round % 4];
         let children = [[2, 2], [4, 4], [1, 3]][round % 3];
         let sheets = sheets(&mut random, usize::from(children[0] * children[1]), size);
-        let [a, b, c] = sheets[0];
-        let normal = if round % 10 == 0 { [0; 3] } else { Plate::normal_along((b - a).cross(c - a)) };
-        let mut envelopes: Vec<_> = sheets.iter().map(|corners| envelope(normal, corners)).collect();
+        let mut envelopes: Vec<_> = sheets.iter().map(|corners| envelope(round % 10 != 0, corners)).collect();
         let first_child = if round % 7 == 0 { 1 } else { 0 };
         envelopes[..first_child].fill(Envelope::EMPTY);
         let mut bytes = [0u32; NODE_BYTES / 4];

@@ -15,7 +15,7 @@
 //! # Invariants
 //! 1. A lane's box holds every box below it.
 //! 2. The test of a box is conservative against the triangle test ([`LatticeRay`](crate::grid::LatticeRay) has the
-//!    argument), so a patch that a ray hits is visited; so is the test of a plate (`plates.rs` has it).
+//!    argument), so a patch that a ray hits is visited; so is the test of a plate ([`Plates`] has it).
 //! 3. The lanes of a node are visited in the order of their entry, to within two [places](crate::math::simd::place);
 //!    those entered at exactly `t_max` are visited too, so that ties are seen.
 //! 4. No arrangement of boxes makes the tree deep or its build quadratic.
@@ -34,12 +34,12 @@ mod plates;
 mod traverse;
 mod visit;
 
+use crate::grid::Plates;
 use crate::ids::PatchId;
 
 pub use build::BUILD_BYTES_PER_PATCH;
 pub use front::{Front, FrontWalk};
 pub use packet_walk::PacketWalk;
-use plates::Plates;
 pub use traverse::{AnyWalk, TraversalStack, Walk};
 
 /// A leaf of the tree.

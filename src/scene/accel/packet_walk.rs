@@ -122,8 +122,7 @@ impl<K: Kernel> PacketWalk<'_, K> {
             return packet.meeting(self.kernel, distance, to_far);
         }
         let plates = &self.nodes.plates[slot as usize / LANES];
-        let plate = &plates.seen_from(packet.origin(), boxes, lane, slot as usize % LANES);
-        packet.meeting_plate(self.kernel, distance, to_far, plate)
+        packet.meeting_plate(self.kernel, [distance, to_far], plates, slot as usize % LANES)
     }
 
     /// Goes on at a node below the present one, or below the front.

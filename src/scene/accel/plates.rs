@@ -1,34 +1,9 @@
-//! Plates of leaves: what a box alone cannot tell.
-//!
-//! The box of a patch that is neither small nor parallel to its sides is mostly empty, and most rays that meet it pass
-//! the patch by. A patch is a sheet, though: it lies in a **plate**, the space between two parallel planes, across its
-//! middle normal. A ray whose way through the box is all above the plate, or all below, does not meet the patch;
-//! nothing is looked up or built for it then.
-//!
-//! A node keeps the plates of its leaves in 44 bytes, as **heights** along the normals above the middles of their
-//! boxes. Heights of the ray where it enters and leaves a box are compared with those: what lies between is between.
-//!
-//! # Why no plate hides a triangle that would be hit
-//! Write u = 2^-24, and N for the sum of a normal's components, at most 381. [`LatticeRay`] has the rest of the words,
-//! and shows that a hit of a triangle has a point P of it, in its plate, which is within 8 u `reach` along each axis of
-//! the point of the ray at P's depth t; and that t lies between where the ray is said to enter the box and to leave it.
-//! So the height of the ray at t is within 8 N u `reach` of the plate. Between two ends heights lie between those of
-//! the ends, and these are computed with errors of
-//!
-//! * 5 N u `reach` for that of the origin above the middle of the box: half a step and rounding to f32 of the origin,
-//!   one step of the middle, the rounding of their difference, of products and of sums,
-//! * 3 N u `reach` for the slope times t,
-//! * 2 N u `reach` for their sum,
-//!
-//! 18 N u `reach` in all. Plates are thickened by 40 N u `reach` on either side when they are put into nodes, with the
-//! longest `reach` there is, 3 times 2^24: 120 N, some 120 to 210 lattice steps. All other rounding is outwards.
-//!
-//! Where the ray ends does not matter: of a triangle that is nearly a line the distance is not known well, and t may
-//! lie behind a hit of another one that is said to be farther.
+//! Plates of leaves ([`Plates`] has the idea): each node has those of its leaves, as seen from the middles of their
+//! boxes.
 
 use super::traverse::spread;
-use super::{EMPTY, LANES, LEAF, NodeBoxes, Nodes, Refs, TopLevel};
-use crate::grid::{LatticeRay, SeenPlate};
+use super::{EMPTY, LEAF, NodeBoxes, Nodes, Refs, TopLevel};
+use crate::grid::{LatticeRay, Plates};
 use crate::math::Plate;
 use crate::math::simd::Kernel;
 use crate::parallel::for_each;
@@ -37,22 +12,6 @@ use parking_lot::Mutex;
 
 /// Nodes that a thread gives their plates before it asks for more.
 const NODES_PER_TASK: usize = 4096;
-
-/// The plates of a node's leaves, as they are seen from the middles of their boxes. Other lanes have one that is all of
-/// space.
-#[derive(Clone, Copy, Debug, Default)]
-#[repr(C)]
-pub(super) struct Plates {
-    /// x, y and z of normals.
-    normals: [[i8; LANES]; 3],
-    /// The heights of their middles, in units.
-    middles: [i8; LANES],
-    /// Half of their thickness.
-    halves: [u8; LANES],
-    unit: f32,
-}
-
-const _: () = assert!(size_of::<Plates>() == 44);
 
 /// What plates need of a ray: origin and direction, each coordinate in all lanes.
 pub(super) struct SpreadRay<K: Kernel> {
@@ -67,71 +26,32 @@ impl<K: Kernel> SpreadRay<K> {
     }
 }
 
-/// A plate as seen from the middle of its leaf's box.
-struct Seen {
-    lane: usize,
-    normal: [i8; 3],
-    middle: f64,
-    half: f64,
-}
-
-impl Seen {
-    fn new(lane: usize, plate: &Plate, boxes: &NodeBoxes) -> Self {
+/// The plates of the leaves among a node's lanes.
+fn plates_of(boxes: &NodeBoxes, refs: &Refs, plates: &[Plate]) -> Plates {
+    let leaves = refs.iter().enumerate().filter(|(_, r)| **r != EMPTY && **r & LEAF != 0);
+    Plates::new(leaves.map(|(lane, r)| {
         let sums = [0, 1, 2].map(|axis| f64::from(boxes.planes[axis][lane]) + f64::from(boxes.planes[axis + 3][lane]));
-        let from = Plate::height(plate.normal, 0.5 * DVec3::from_array(sums));
-        let [low, high] = [plate.low, plate.high].map(|height| f64::from(height) - from);
-        Self { lane, normal: plate.normal, middle: 0.5 * (low + high), half: 0.5 * (high - low) + plate.margin() }
-    }
+        (lane, &plates[(r & !LEAF) as usize], 0.5 * DVec3::from_array(sums))
+    }))
 }
 
-impl Plates {
-    /// Those of the leaves among a node's lanes.
-    fn of(boxes: &NodeBoxes, refs: &Refs, plates: &[Plate]) -> Self {
-        let leaves = refs.iter().enumerate().filter(|(_, r)| **r != EMPTY && **r & LEAF != 0);
-        let seen = leaves.map(|(lane, r)| Seen::new(lane, &plates[(r & !LEAF) as usize], boxes));
-        let units = seen.clone().map(|of| (of.middle.abs() / 127.0).max(of.half / 254.0));
-        let unit = (units.fold(0.0, f64::max) as f32).next_up();
-        let mut out = Self { unit, ..Self::default() };
-        for Seen { lane, normal, middle, half } in seen {
-            let middle = middle / f64::from(unit);
-            out.middles[lane] = middle.round() as i8;
-            out.halves[lane] = (half / f64::from(unit) + (middle - middle.round()).abs()).ceil() as u8;
-            (0..3).for_each(|axis| out.normals[axis][lane] = normal[axis]);
-        }
-        out
-    }
-
-    /// The plate of one lane as seen from a point. `boxes` has the leaf's box in lane `of_box`.
+impl NodeBoxes {
+    /// How far beyond its plate a ray stays that enters and leaves the boxes there: see [`Plates::distance`].
     #[inline(always)]
-    pub fn seen_from(&self, origin: [i32; 3], boxes: &NodeBoxes, of_box: usize, lane: usize) -> SeenPlate {
-        let (mut normal, mut start) = ([0.0; 3], 0.0);
-        for axis in 0..3 {
-            let planes = [boxes.planes[axis][of_box % LANES], boxes.planes[axis + 3][of_box % LANES]];
-            normal[axis] = f32::from(self.normals[axis][lane % LANES]);
-            start += normal[axis] * (origin[axis] as f32 - 0.5 * (planes[0] + planes[1]));
+    pub(super) fn distance_of_plates<K: Kernel>(
+        &self,
+        k: K,
+        plates: &Plates,
+        ray: &SpreadRay<K>,
+        enter: K::F,
+        leave: K::F,
+    ) -> K::F {
+        let mut from_middle = ray.origin;
+        for (axis, from) in from_middle.iter_mut().enumerate() {
+            let twice_middle = k.add(k.load(&self.planes[axis]), k.load(&self.planes[axis + 3]));
+            *from = k.mul_add(twice_middle, k.splat(-0.5), *from);
         }
-        let middle = f32::from(self.middles[lane % LANES]) * self.unit;
-        let half = f32::from(self.halves[lane % LANES]) * self.unit;
-        SeenPlate { normal, start: start - middle, low: -half, high: half }
-    }
-
-    /// How far beyond its plate a ray stays that enters and leaves the node's boxes there, lane by lane: zero or less
-    /// if it meets the plate.
-    #[inline(always)]
-    pub fn distance<K: Kernel>(&self, k: K, boxes: &NodeBoxes, ray: &SpreadRay<K>, enter: K::F, leave: K::F) -> K::F {
-        let unit = k.splat(self.unit);
-        let mut start = k.mul(k.widen_signed(&self.middles), k.sub(k.splat(-0.0), unit));
-        let mut slope = k.splat(0.0);
-        for axis in 0..3 {
-            let normal = k.widen_signed(&self.normals[axis]);
-            let twice_middle = k.add(k.load(&boxes.planes[axis]), k.load(&boxes.planes[axis + 3]));
-            let from_middle = k.mul_add(twice_middle, k.splat(-0.5), ray.origin[axis]);
-            start = k.mul_add(normal, from_middle, start);
-            slope = k.mul_add(normal, ray.direction[axis], slope);
-        }
-        let (first, last) = (k.mul_add(enter, slope, start), k.mul_add(leave, slope, start));
-        let (above, below) = (k.min(first, last), k.sub(k.splat(-0.0), k.max(first, last)));
-        k.sub(k.max(above, below), k.mul(k.widen(&self.halves), unit))
+        plates.distance(k, from_middle, &ray.direction, enter, leave)
     }
 }
 
@@ -144,7 +64,7 @@ impl TopLevel {
         for_each(&tasks, n_threads, |_, task| {
             let (first, of_nodes) = &mut *task.lock();
             for (node, of_node) in (*first..).zip(of_nodes.iter_mut()) {
-                *of_node = Plates::of(&boxes[node], &refs[node], plates);
+                *of_node = plates_of(&boxes[node], &refs[node], plates);
             }
         });
         drop(tasks);
@@ -154,6 +74,7 @@ impl TopLevel {
 
 #[cfg(test)]
 mod tests {
+    use super::super::LANES;
     use super::super::tests::{random, random_point};
     use super::*;
     use crate::grid::TriangleId;
@@ -186,8 +107,7 @@ mod tests {
                 let (kept, plate) = (&tree.nodes.plates[node], &plates[leaf.patch.idx()]);
                 let b = &boxes[leaf.patch.idx()];
                 let above = Plate::height(plate.normal, 0.5 * (b.min.as_dvec3() + b.max.as_dvec3()));
-                let unit = f64::from(kept.unit);
-                let (middle, half) = (unit * f64::from(kept.middles[lane]), unit * f64::from(kept.halves[lane]));
+                let [middle, half, unit] = kept.kept(lane);
                 let below = f64::from(plate.low) - plate.margin() - (above + middle - half);
                 let beyond = above + middle + half - (f64::from(plate.high) + plate.margin());
                 // But for the rounding of f64.

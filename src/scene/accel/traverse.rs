@@ -1,8 +1,8 @@
 //! Rays through the wide tree.
 
-use super::plates::{Plates, SpreadRay};
+use super::plates::SpreadRay;
 use super::{LANES, LEAF, LeafRef, LeafWalk, NodeBoxes, Refs, TopLevel};
-use crate::grid::{LatticeRay, Plane};
+use crate::grid::{LatticeRay, Plane, Plates};
 use crate::ids::PatchId;
 use crate::math::simd::{Kernel, place};
 
@@ -145,7 +145,8 @@ impl<K: Kernel> Walk<'_, K> {
         let leaves = leaves_among(k, &self.nodes.refs[node as usize]);
         let mut end = k.min(leave, k.splat(t_max));
         if k.le(enter, end) & leaves != 0 {
-            let distance = self.nodes.plates[node as usize].distance(k, boxes, &self.spread, enter, leave);
+            let plates = &self.nodes.plates[node as usize];
+            let distance = boxes.distance_of_plates(k, plates, &self.spread, enter, leave);
             // What is not a number, in empty lanes, counts as zero.
             end = k.mul_add(k.max(distance, k.splat(0.0)), k.splat(-FAR_BEFORE), end);
         }
@@ -255,7 +256,8 @@ impl<K: Kernel> AnyWalk<'_, K> {
         (self.node, self.leaves) = (self.next, met & leaves);
         if self.leaves != 0 {
             let plates = &self.nodes.plates[self.next as usize];
-            self.leaves &= k.le(plates.distance(k, boxes, &self.spread, enter, leave), k.splat(0.0));
+            let distance = boxes.distance_of_plates(k, plates, &self.spread, enter, leave);
+            self.leaves &= k.le(distance, k.splat(0.0));
         }
         if inner == 0 {
             self.n -= 1;

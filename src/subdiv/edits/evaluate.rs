@@ -57,23 +57,24 @@ impl Evaluator {
         }
     }
 
-    /// As `bounds` for a patch under edits, whose points have no heights.
+    /// As `bounds` for a patch under edits.
     pub fn edited_bounds(
         &mut self,
         library: &PlanLibrary,
         tree: &EditTree,
-        u: [f64; 2],
-        v: [f64; 2],
+        normal: [i8; 3],
+        [u, v]: [[f64; 2]; 2],
         depth: u32,
     ) -> Extent {
         match tree {
-            EditTree::Rest { node, ring } => self.bounds(library, *node, ring, u, v, depth),
+            EditTree::Rest { node, ring } => self.bounds(library, *node, ring, normal, [u, v], depth),
             EditTree::Split(quarters) => {
                 let mut bounds = Extent::EMPTY;
                 for (k, tree) in quarters.iter().enumerate() {
                     let (x, y) = quarter(k);
                     if let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) {
-                        bounds = bounds.union(self.edited_bounds(library, tree, u, v, depth.saturating_sub(1)));
+                        let depth = depth.saturating_sub(1);
+                        bounds = bounds.union(self.edited_bounds(library, tree, normal, [u, v], depth));
                     }
                 }
                 bounds
