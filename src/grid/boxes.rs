@@ -141,10 +141,12 @@ impl Head {
     /// The middle of a lane's box as it is tested, without the ray's slack.
     #[inline(always)]
     pub fn middle_of(&self, lane: usize) -> DVec3 {
-        DVec3::from_array([0, 1, 2].map(|k| {
+        let mut middle = [0.0; 3];
+        for (k, middle) in middle.iter_mut().enumerate() {
             let sum = u32::from(self.planes[k][lane]) + u32::from(self.planes[k + 3][lane]);
-            f64::from(self.base[k]) + 0.5 * f64::from(sum << self.exponent[k])
-        }))
+            *middle = f64::from(self.base[k]) + 0.5 * f64::from((sum << self.exponent[k]) as i32);
+        }
+        DVec3::from_array(middle)
     }
 
     /// The box of a lane as it is tested, without the ray's slack.

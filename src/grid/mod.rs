@@ -52,7 +52,7 @@ pub use node::{NODE_BYTES, NodeView, encode_node, is_node};
 pub use packet::{PACKET, RayPacket, SeenBoxes};
 use piece::leaves_below;
 pub use piece::{MAX_CELLS, MOST_PIECE_BYTES, PieceLayout, PieceView, VertexFormat};
-pub use plates::Plates;
+pub use plates::{ExactPlates, Plates};
 pub use ray::{LATTICE_LIMIT, LatticeRay, Plane};
 pub use skyline::{PartSkyline, SeenFrom, Skyline, SkylineSheet, SkylineView};
 

@@ -1,7 +1,7 @@
 //! The node: boxes around up to 4x4 children of a patch's tree of pieces, and plates.
 
 use super::boxes::{ALL_X, ALL_Y, ALL_Z, CellRect, Head, IntegerBox, LaneBoxes, LaneHits, Slabs, lane_mask, union};
-use super::{HEAD_BYTES, LATTICE_LIMIT, LatticeRay, Plates};
+use super::{ExactPlates, HEAD_BYTES, LATTICE_LIMIT, LatticeRay, Plates};
 use crate::math::simd::{self, Kernel, Task};
 use crate::math::{Bounds, Envelope};
 use glam::Vec3;
@@ -61,10 +61,13 @@ fn encode(cells: CellRect, children: [u8; 2], envelopes: &[Envelope], out: &mut 
     let head: &mut Head = bytemuck::from_bytes_mut(head);
     head.set(whole, &boxes, children, cells, [0; 2], NO_FORMAT);
     children_and_lanes().filter(|(of, _)| of.bounds.is_empty()).for_each(|(_, lane)| head.turn_inside_out(lane));
+    let mut exact = [ExactPlates::NONE; 2];
+    for (of, lane) in children_and_lanes().filter(|(of, _)| !of.bounds.is_empty()) {
+        exact[lane / 8 % 2].set(lane % 8, &of.plate, head.middle_of(lane));
+    }
     let plates: &mut ChildPlates = bytemuck::from_bytes_mut(plates);
-    for (half, plates) in plates.iter_mut().enumerate() {
-        let filled = children_and_lanes().filter(|(of, lane)| !of.bounds.is_empty() && lane / 8 == half);
-        *plates = Plates::new(filled.map(|(of, lane)| (lane % 8, &of.plate, head.middle_of(lane))));
+    for (plates, exact) in plates.iter_mut().zip(&exact) {
+        *plates = exact.rounded();
     }
 }
 

@@ -62,40 +62,53 @@ pub struct SeenPlate {
     pub half: f32,
 }
 
-/// A lane's plate as seen from the middle of its box.
-struct Seen {
-    lane: usize,
-    normal: [i8; 3],
-    middle: f64,
-    half: f64,
+/// Plates of eight lanes as they are, as seen from the middles of their boxes.
+#[derive(Clone, Copy, Debug)]
+pub struct ExactPlates {
+    normals: [[i8; LANES]; 3],
+    middles: [f64; LANES],
+    halves: [f64; LANES],
 }
 
-impl Seen {
+impl ExactPlates {
+    /// Lanes without a plate.
+    pub const NONE: Self = Self { normals: [[0; LANES]; 3], middles: [0.0; LANES], halves: [0.0; LANES] };
+
+    /// Gives a lane its plate.
     #[inline(always)]
-    fn new((lane, plate, middle_of_box): (usize, &Plate, DVec3)) -> Self {
+    pub fn set(&mut self, lane: usize, plate: &Plate, middle_of_box: DVec3) {
         let from = Plate::height(plate.normal, middle_of_box);
-        let [low, high] = [plate.low, plate.high].map(|height| f64::from(height) - from);
-        Self { lane, normal: plate.normal, middle: 0.5 * (low + high), half: 0.5 * (high - low) + plate.margin() }
+        let (low, high) = (f64::from(plate.low) - from, f64::from(plate.high) - from);
+        self.middles[lane] = 0.5 * (low + high);
+        self.halves[lane] = 0.5 * (high - low) + plate.margin();
+        for (of_axis, x) in self.normals.iter_mut().zip(plate.normal) {
+            of_axis[lane] = x;
+        }
+    }
+
+    /// The plates as they are kept: rounded outwards. (One step for all lanes after the other, so that the compiler
+    /// makes vectors of them.)
+    #[inline(always)]
+    pub fn rounded(&self) -> Plates {
+        let mut unit = 0.0;
+        for lane in 0..LANES {
+            let least = (self.middles[lane].abs() / 127.0).max(self.halves[lane] / 254.0);
+            unit = if least > unit { least } else { unit };
+        }
+        let unit = (unit as f32).next_up();
+        let per_unit = 1.0 / f64::from(unit);
+        let (mut middles, mut halves) = ([0; LANES], [0; LANES]);
+        for lane in 0..LANES {
+            let middle = self.middles[lane] * per_unit;
+            let whole = middle.round_ties_even();
+            middles[lane] = whole as i8;
+            halves[lane] = (self.halves[lane] * per_unit + (middle - whole).abs()).ceil() as u8;
+        }
+        Plates { normals: self.normals, middles, halves, unit }
     }
 }
 
 impl Plates {
-    /// The plates of some lanes, 0 to 7, each with the middle of its box.
-    #[inline(always)]
-    pub fn new<'a>(lanes: impl Iterator<Item = (usize, &'a Plate, DVec3)> + Clone) -> Self {
-        let seen = lanes.map(Seen::new);
-        let units = seen.clone().map(|of| (of.middle.abs() / 127.0).max(of.half / 254.0));
-        let unit = (units.fold(0.0, f64::max) as f32).next_up();
-        let mut out = Self { unit, ..Self::default() };
-        for Seen { lane, normal, middle, half } in seen {
-            let middle = middle / f64::from(unit);
-            out.middles[lane] = middle.round() as i8;
-            out.halves[lane] = (half / f64::from(unit) + (middle - middle.round()).abs()).ceil() as u8;
-            (0..3).for_each(|axis| out.normals[axis][lane] = normal[axis]);
-        }
-        out
-    }
-
     /// How far beyond its plate a ray stays that enters and leaves the boxes of the lanes there, lane by lane: zero or
     /// less if it meets the plate. Its origin is seen `from_middle` of each box.
     #[inline(always)]

@@ -33,25 +33,34 @@ impl Envelope {
 
 impl Plate {
     /// The normal for plates along this direction, of any length; zero if it has none.
+    #[inline(always)]
     pub fn normal_along(direction: DVec3) -> [i8; 3] {
         let scaled = direction * (127.0 / direction.abs().max_element());
-        // Casts of NaN give zero.
-        scaled.round().to_array().map(|x| if scaled.is_finite() { x as i8 } else { 0 })
+        if !scaled.is_finite() {
+            return [0; 3];
+        }
+        let [x, y, z] = scaled.to_array();
+        [x.round_ties_even() as i8, y.round_ties_even() as i8, z.round_ties_even() as i8]
     }
 
     /// The plate with this normal that holds heights from `low` to `high`, finite ones.
+    #[inline(always)]
     pub fn around(normal: [i8; 3], low: f64, high: f64) -> Self {
         Self { normal, low: (low as f32).next_down(), high: (high as f32).next_up() }
     }
 
     /// By how much more than it is a plate has to reach on either side, in lengths of the normal, so that no ray which
     /// hits something in it is said to pass it by. The argument is in `scene/accel/plates.rs`.
+    #[inline(always)]
     pub fn margin(&self) -> f64 {
-        1.0 + MARGIN * self.normal.iter().map(|x| f64::from(*x).abs()).sum::<f64>()
+        let [x, y, z] = self.normal;
+        1.0 + MARGIN * f64::from(i32::from(x).abs() + i32::from(y).abs() + i32::from(z).abs())
     }
 
     /// Height of a point above the origin, in lengths of the normal.
+    #[inline(always)]
     pub fn height(normal: [i8; 3], p: DVec3) -> f64 {
-        DVec3::from_array(normal.map(f64::from)).dot(p)
+        let [x, y, z] = normal;
+        DVec3::new(f64::from(x), f64::from(y), f64::from(z)).dot(p)
     }
 }

@@ -10,6 +10,7 @@
 //! the guard and the other just outside, they still agree: the owner's value lies within the evaluation error, far less
 //! than the guard, of one that is a whole guard away from the boundary.
 
+use super::bounds::GridReaches;
 use super::eval::{Evaluator, SurfaceSample};
 use super::extent::{Extent, Reach};
 use super::regular::MOST_PARTS;
@@ -419,8 +420,7 @@ impl Dicer {
         if !surface.grid_of_parts(points, &mut self.evaluator, rectangle, n, depth, &mut reaches) {
             return false;
         }
-        let reaches = reaches.chunks_exact(MOST_PARTS).take(n).flat_map(|row| &row[..n]);
-        out.extend(reaches.map(|Reach { extent, normal }| in_lattice(*normal, extent)));
+        simd::run(LatticeEnvelopes { reaches: &reaches, n, out });
         true
     }
 
@@ -441,6 +441,27 @@ fn range([a, b]: [u32; 2], n: u32) -> [f64; 2] {
 /// What vertices of a surface that reaches so far lie in.
 fn in_lattice(normal: [i8; 3], extent: &Extent) -> Envelope {
     Envelope { bounds: to_lattice_box(extent), plate: to_lattice_plate(normal, extent) }
+}
+
+/// Appends what vertices of `n` x `n` parts lie in.
+struct LatticeEnvelopes<'a> {
+    reaches: &'a GridReaches,
+    n: usize,
+    out: &'a mut Vec<Envelope>,
+}
+
+impl Task for LatticeEnvelopes<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(self, k: K) {
+        let Self { reaches, n, out } = self;
+        for row in reaches.chunks_exact(MOST_PARTS).take(n) {
+            for Reach { extent, normal } in &row[..n] {
+                let bounds = LatticeBox { extent }.run(k);
+                out.push(Envelope { bounds, plate: to_lattice_plate(*normal, extent) });
+            }
+        }
+    }
 }
 
 /// By how much rounding moves a coordinate at most, and a little for evaluation errors.
@@ -473,10 +494,11 @@ impl Task for LatticeBox<'_> {
 }
 
 /// The plate of what reaches so far, for vertices.
+#[inline(always)]
 fn to_lattice_plate(normal: [i8; 3], extent: &Extent) -> Plate {
-    let [sum, length] = [normal.map(f64::from), normal.map(|x| f64::from(x).abs())].map(|x| x.iter().sum::<f64>());
-    let [low, high] = [extent.low, extent.high].map(|p| p.0[3] + LATTICE_SHIFT * sum);
-    Plate::around(normal, low - ROUNDED * length, high + ROUNDED * length)
+    let [x, y, z] = [i32::from(normal[0]), i32::from(normal[1]), i32::from(normal[2])];
+    let (shift, moved) = (LATTICE_SHIFT * f64::from(x + y + z), ROUNDED * f64::from(x.abs() + y.abs() + z.abs()));
+    Plate::around(normal, extent.low.0[3] + shift - moved, extent.high.0[3] + shift + moved)
 }
 
 impl OwnerScratch {

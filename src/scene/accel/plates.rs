@@ -3,7 +3,7 @@
 
 use super::traverse::spread;
 use super::{EMPTY, LEAF, NodeBoxes, Nodes, Refs, TopLevel};
-use crate::grid::{LatticeRay, Plates};
+use crate::grid::{ExactPlates, LatticeRay, Plates};
 use crate::math::Plate;
 use crate::math::simd::Kernel;
 use crate::parallel::for_each;
@@ -28,11 +28,12 @@ impl<K: Kernel> SpreadRay<K> {
 
 /// The plates of the leaves among a node's lanes.
 fn plates_of(boxes: &NodeBoxes, refs: &Refs, plates: &[Plate]) -> Plates {
-    let leaves = refs.iter().enumerate().filter(|(_, r)| **r != EMPTY && **r & LEAF != 0);
-    Plates::new(leaves.map(|(lane, r)| {
+    let mut exact = ExactPlates::NONE;
+    for (lane, r) in refs.iter().enumerate().filter(|(_, r)| **r != EMPTY && **r & LEAF != 0) {
         let sums = [0, 1, 2].map(|axis| f64::from(boxes.planes[axis][lane]) + f64::from(boxes.planes[axis + 3][lane]));
-        (lane, &plates[(r & !LEAF) as usize], 0.5 * DVec3::from_array(sums))
-    }))
+        exact.set(lane, &plates[(r & !LEAF) as usize], 0.5 * DVec3::from_array(sums));
+    }
+    exact.rounded()
 }
 
 impl NodeBoxes {
