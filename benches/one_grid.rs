@@ -4,7 +4,7 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use glam::DVec3;
-use lazytess::grid::{CellRect, NODE_BYTES, PieceLayout, encode_node};
+use lazytess::grid::{CellRect, PieceLayout, encode_node, node_bytes};
 use lazytess::ids::{PatchId, VertexId};
 use lazytess::math::{Envelope, LatticeGrid};
 use lazytess::mesh::{ControlMesh, Crease, shapes};
@@ -84,7 +84,9 @@ impl Builder {
         let (part, out) = ([2, 2], &mut self.envelopes);
         assert!(self.dicer.envelopes_of_parts(surface, patch, rates, [0, 0], part, PIECE, 4, out));
         let cells = CellRect { i0: 0, j0: 0, i1: RATE as u16, j1: RATE as u16 };
-        encode_node(cells, [2, 2], &self.envelopes, &mut bytemuck::cast_slice_mut(&mut self.block)[..NODE_BYTES]);
+        let children = [2, 2];
+        let block = &mut bytemuck::cast_slice_mut(&mut self.block)[..node_bytes(children)];
+        encode_node(cells, children, &self.envelopes, block);
         black_box(&self.block);
     }
 

@@ -48,7 +48,7 @@ mod vertex_row;
 pub use boxes::{CellRect, HEAD_BYTES, LaneHits, lane_mask};
 pub use hit::{LatticeHit, TriangleId};
 pub use horizon::{Borders, Horizon};
-pub use node::{NODE_BYTES, NodeView, encode_node, is_node};
+pub use node::{NodeView, cells_of, encode_node, is_node, node_bytes};
 pub use packet::{PACKET, RayPacket, SeenBoxes};
 use piece::leaves_below;
 pub use piece::{MAX_CELLS, MOST_PIECE_BYTES, PieceLayout, PieceView, VertexFormat};

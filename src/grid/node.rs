@@ -6,18 +6,20 @@ use crate::math::simd::{self, Kernel, Task};
 use crate::math::{Bounds, Envelope};
 use glam::Vec3;
 
-/// Exact size of a node, without the words that the cache puts before it.
-pub const NODE_BYTES: usize = HEAD_BYTES + size_of::<ChildPlates>();
+/// The plates of lanes 0 to 7, and of 8 to 15 if there are any.
+type ChildPlates = [Plates];
 
-/// The plates of lanes 0 to 7 and 8 to 15.
-pub(super) type ChildPlates = [Plates; 2];
+/// Exact size of a node with so many children along u and v, without the words that the cache puts before it.
+pub fn node_bytes(children: [u8; 2]) -> usize {
+    HEAD_BYTES + usize::from(children[1].div_ceil(2)) * size_of::<Plates>()
+}
 
 /// In place of a vertex format: a node has no vertices.
 const NO_FORMAT: u8 = 0;
 
 /// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `envelopes` has one
 /// in lattice units for each, u fastest; it must hold every lattice vertex of the child. A child with an empty box is
-/// never met; one at least is not empty, and the plates of those have one normal. `out` is [`NODE_BYTES`] long.
+/// never met; one at least is not empty, and the plates of those have one normal. `out` is as long as [`node_bytes`] says.
 #[inline]
 pub fn encode_node(cells: CellRect, children: [u8; 2], envelopes: &[Envelope], out: &mut [u8]) {
     simd::run(EncodeNode { cells, children, envelopes, out });
@@ -65,7 +67,7 @@ fn encode(cells: CellRect, children: [u8; 2], envelopes: &[Envelope], out: &mut 
     for (of, lane) in children_and_lanes().filter(|(of, _)| !of.bounds.is_empty()) {
         exact[lane / 8 % 2].set(lane % 8, &of.plate, head.middle_of(lane));
     }
-    let plates: &mut ChildPlates = bytemuck::from_bytes_mut(plates);
+    let plates: &mut ChildPlates = bytemuck::cast_slice_mut(plates);
     for (plates, exact) in plates.iter_mut().zip(&exact) {
         *plates = exact.rounded();
     }
@@ -81,7 +83,17 @@ fn integer_box(b: &Bounds) -> IntegerBox {
 /// Whether a block is a node; else it is a piece. The block is as for [`NodeView::new`].
 #[inline(always)]
 pub fn is_node(block: &[u8]) -> bool {
-    bytemuck::from_bytes::<Head>(&block[..HEAD_BYTES]).format == NO_FORMAT
+    head_of(block).format == NO_FORMAT
+}
+
+/// The cells that a block is over, whether it is a node or a piece.
+pub fn cells_of(block: &[u8]) -> CellRect {
+    head_of(block).cells
+}
+
+#[inline(always)]
+fn head_of(block: &[u8]) -> &Head {
+    bytemuck::from_bytes(&block[..HEAD_BYTES])
 }
 
 /// A node to be read.
@@ -95,8 +107,8 @@ impl<'b> NodeView<'b> {
     /// The node at the start of `bytes`, which must be aligned to 4 bytes at least (64 is best).
     #[inline(always)]
     pub fn new(bytes: &'b [u8]) -> Self {
-        let (head, plates) = bytes[..NODE_BYTES].split_at(HEAD_BYTES);
-        Self { head: bytemuck::from_bytes(head), plates: bytemuck::from_bytes(plates) }
+        let head = head_of(bytes);
+        Self { head, plates: bytemuck::cast_slice(&bytes[HEAD_BYTES..node_bytes(head.lanes)]) }
     }
 
     /// The cells that the node covers.

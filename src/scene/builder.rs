@@ -5,7 +5,7 @@ use super::departure::DepartureCounts;
 use super::world::{GridCache, WorldMesh};
 use crate::cache::{Block, BlockLayout, Claim, Recorder, Slot, SlotId, Visit};
 use crate::grid::{
-    Borders, CellRect, MAX_CELLS, MOST_PIECE_BYTES, NODE_BYTES, NodeView, PieceLayout, PieceView, encode_node, is_node,
+    Borders, CellRect, MAX_CELLS, MOST_PIECE_BYTES, PieceLayout, PieceView, cells_of, encode_node, is_node, node_bytes,
 };
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Envelope, LatticeGrid};
@@ -127,7 +127,7 @@ impl<'w> Builder<'w> {
         let children = self.child_envelopes(of, &rates, cells);
         let n_slots = (NODE_SIDE * u32::from(children[1] - 1)) as usize + usize::from(children[0]);
         let envelopes = &self.envelopes;
-        ticket.publish(BlockLayout { bytes: NODE_BYTES, children: n_slots }, |out| {
+        ticket.publish(BlockLayout { bytes: node_bytes(children), children: n_slots }, |out| {
             encode_node(cells, children, envelopes, out);
         })
     }
@@ -212,7 +212,7 @@ impl<'w> Builder<'w> {
         if !is_node(block.bytes()) {
             return;
         }
-        let cells = NodeView::new(block.bytes()).cells();
+        let cells = cells_of(block.bytes());
         let side = child_side(cells);
         let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
         for (b, a) in (0..n_v).flat_map(|b| (0..n_u).map(move |a| (b, a))) {

@@ -14,7 +14,7 @@ use super::pieces::{n_pieces, with_pieces};
 use super::skyline;
 use super::world::{GridCache, WorldMesh};
 use crate::cache::{MemoTable, Pin, Slot, Visit};
-use crate::grid::{CellRect, Horizon, LatticeRay, NodeView, PartSkyline, SeenFrom, Skyline};
+use crate::grid::{CellRect, Horizon, LatticeRay, PartSkyline, SeenFrom, Skyline, cells_of};
 use crate::ids::{MeshId, PatchId};
 use crate::math::simd::{self, Kernel};
 use crate::math::{PrimitiveRef, Ray};
@@ -387,7 +387,7 @@ impl<'v> Left<'_, 'v, '_, '_> {
     fn cells(&mut self) -> CellRect {
         match self.visit.peek(self.root) {
             // In the head, which nodes and pieces have in common.
-            Some(block) => NodeView::new(block.bytes()).cells(),
+            Some(block) => cells_of(block.bytes()),
             None => self.builder.cells_of(self.of),
         }
     }

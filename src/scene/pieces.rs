@@ -3,7 +3,7 @@
 
 use super::builder::{Builder, NODE_SIDE, PatchContext, child_cells, child_side, is_piece};
 use crate::cache::{Block, Visit};
-use crate::grid::{CellRect, MAX_CELLS, NodeView, PieceView};
+use crate::grid::{CellRect, MAX_CELLS, PieceView, cells_of};
 
 /// Pieces over so many cells.
 pub(super) fn n_pieces(cells: CellRect) -> usize {
@@ -19,8 +19,7 @@ pub(super) fn with_pieces<T>(
     take: impl FnOnce(&[PieceView<'_>]) -> T,
 ) -> T {
     let cells = match block {
-        // In the head, which nodes and pieces have in common.
-        Some(block) => NodeView::new(block.bytes()).cells(),
+        Some(block) => cells_of(block.bytes()),
         None => builder.cells_of(of),
     };
     let n = n_pieces(cells);

@@ -27,7 +27,7 @@ impl SeenBoxes {
     /// Those of them that meet the plate of a node's child within the box.
     #[inline(always)]
     pub fn meeting_plate<K: Kernel>(&self, k: K, packet: &RayPacket, lane: usize, node: NodeView<'_>) -> u32 {
-        packet.meeting_plate(k, self.lane(lane), &node.plates[lane / 8 % 2], lane % 8)
+        packet.meeting_plate(k, self.lane(lane), &node.plates[lane / 8], lane % 8)
     }
 
     /// The planes of a lane.

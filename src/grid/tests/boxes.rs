@@ -2,7 +2,7 @@
 
 use super::support::{Piece, Random, sheet, whole};
 use crate::grid::boxes::{CellRect, IntegerBox};
-use crate::grid::{NODE_BYTES, NodeView, encode_node};
+use crate::grid::{NodeView, encode_node, node_bytes};
 use crate::math::{Bounds, Envelope, Plate};
 use glam::{IVec3, Vec3};
 
@@ -54,7 +54,7 @@ fn a_node_holds_the_boxes_of_its_children() {
     for children in [[1, 1], [4, 4], [3, 2], [1, 4]] {
         let n = usize::from(children[0]) * usize::from(children[1]);
         let bounds: Vec<Bounds> = (0..n).map(|_| (0..2).map(|_| random.point(3e6).as_vec3()).collect()).collect();
-        let mut bytes = [0u32; NODE_BYTES / 4];
+        let mut bytes = vec![0u32; node_bytes(children) / 4];
         let cells = CellRect { i0: 8, j0: 0, i1: 40, j1: 32 };
         let envelopes: Vec<_> = bounds.iter().map(|&bounds| in_any_plate(bounds)).collect();
         encode_node(cells, children, &envelopes, bytemuck::cast_slice_mut(&mut bytes));
@@ -72,7 +72,7 @@ fn a_node_holds_the_boxes_of_its_children() {
 #[test]
 fn a_node_cuts_boxes_to_the_lattice() {
     let b = Bounds { min: Vec3::splat(-3e7), max: Vec3::splat(f32::INFINITY) };
-    let mut bytes = [0u32; NODE_BYTES / 4];
+    let mut bytes = vec![0u32; node_bytes([1, 1]) / 4];
     encode_node(whole(8, 8), [1, 1], &[in_any_plate(b)], bytemuck::cast_slice_mut(&mut bytes));
     let [low, high] = NodeView::new(bytemuck::cast_slice(&bytes)).head.decoded_box(0);
     assert!(low == [-(1 << 24); 3] && high.iter().all(|h| *h >= 1 << 24));

@@ -1,7 +1,7 @@
 //! Plates of a node's children hide none that a ray hits.
 
 use super::support::Random;
-use crate::grid::{CellRect, LatticeRay, NODE_BYTES, NodeView, PACKET, RayPacket, SeenBoxes, TriangleId, encode_node};
+use crate::grid::{CellRect, LatticeRay, NodeView, PACKET, RayPacket, SeenBoxes, TriangleId, encode_node, node_bytes};
 use crate::math::simd::{Kernel, Portable, Task, run};
 use crate::math::{Bounds, Envelope, Plate};
 use glam::DVec3;
@@ -62,7 +62,7 @@ fn no_child_that_a_ray_hits_is_hidden_and_some_that_it_passes_are() {
         let mut envelopes: Vec<_> = sheets.iter().map(|corners| envelope(round % 10 != 0, corners)).collect();
         let first_child = if round % 7 == 0 { 1 } else { 0 };
         envelopes[..first_child].fill(Envelope::EMPTY);
-        let mut bytes = [0u32; NODE_BYTES / 4];
+        let mut bytes = vec![0u32; node_bytes(children) / 4];
         let cells = CellRect { i0: 0, j0: 0, i1: 32, j1: 32 };
         encode_node(cells, children, &envelopes, bytemuck::cast_slice_mut(&mut bytes));
         let node = NodeView::new(bytemuck::cast_slice(&bytes));

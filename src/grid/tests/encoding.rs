@@ -1,7 +1,7 @@
 //! Pieces give back what was put in, in the bytes that were promised.
 
 use super::support::{Piece, Random, sheet, whole};
-use crate::grid::{CellRect, PieceLayout, PieceView, VertexFormat};
+use crate::grid::{CellRect, PieceLayout, PieceView, VertexFormat, cells_of, is_node};
 use crate::math::LatticeGrid;
 
 #[test]
@@ -14,6 +14,10 @@ fn every_vertex_comes_back_in_every_format_and_size() {
             let grid = LatticeGrid::from_points(&vertices, usize::from(n_u) + 1);
             let layout = PieceLayout::new(&grid, piece.view().cells(), [64; 2]);
             assert_eq!(layout.format(), format, "{n_u} x {n_v}");
+            let mut bytes = vec![0u32; layout.bytes() / 4];
+            layout.encode(&grid, bytemuck::cast_slice_mut(&mut bytes));
+            let block = bytemuck::cast_slice(&bytes);
+            assert_eq!((cells_of(block), is_node(block)), (piece.view().cells(), false));
             for (at, v) in vertices.iter().enumerate() {
                 let (i, j) = (at % usize::from(n_u + 1), at / usize::from(n_u + 1));
                 assert_eq!(piece.view().vertex(i, j), *v, "({i}, {j}) of {n_u} x {n_v}, {format:?}");
