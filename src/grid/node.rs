@@ -1,8 +1,8 @@
 //! The node: boxes around up to 4x4 children of a patch's tree of pieces, and plates.
 
-use super::boxes::{ALL_X, ALL_Y, ALL_Z, CellRect, Head, IntegerBox, LaneBoxes, LaneHits, Slabs, lane_mask, union};
+use super::boxes::{CellRect, Head, IntegerBox, LaneBoxes, LaneHits, Slabs, lane_mask, union};
 use super::{ExactPlates, HEAD_BYTES, LATTICE_LIMIT, LatticeRay, Plates};
-use crate::math::simd::{self, Kernel, Task};
+use crate::math::simd::{self, Kernel, Task, spread};
 use crate::math::{Bounds, Envelope};
 use glam::Vec3;
 
@@ -19,7 +19,7 @@ const NO_FORMAT: u8 = 0;
 
 /// Writes a node over `cells` with a grid of `children` = [along u, along v] children, 1 to 4 each. `envelopes` has one
 /// in lattice units for each, u fastest; it must hold every lattice vertex of the child. A child with an empty box is
-/// never met; one at least is not empty, and the plates of those have one normal. `out` is as long as [`node_bytes`] says.
+/// never met; one at least is not empty. `out` is as long as [`node_bytes`] says.
 #[inline]
 pub fn encode_node(cells: CellRect, children: [u8; 2], envelopes: &[Envelope], out: &mut [u8]) {
     simd::run(EncodeNode { cells, children, envelopes, out });
@@ -206,10 +206,4 @@ impl<K: Kernel> Through<K> {
         }
         from
     }
-}
-
-/// x, y and z, each in all lanes.
-#[inline(always)]
-fn spread<K: Kernel>(k: K, x: K::F) -> [K::F; 3] {
-    [k.shuffle::<ALL_X>(x), k.shuffle::<ALL_Y>(x), k.shuffle::<ALL_Z>(x)]
 }

@@ -579,34 +579,84 @@ impl OwnerScratch {
 mod tests {
     use super::*;
     use crate::mesh::random::random_mesh;
-    use crate::mesh::shapes;
+    use crate::mesh::{ControlMesh, shapes};
+    use crate::subdiv::refine::tests::edits::{edited_cube, edited_tetrahedron};
+
+    fn meshes() -> impl Iterator<Item = ControlMesh> {
+        let shapes = shapes::all().into_iter().map(|(_, mesh)| mesh);
+        shapes.chain([edited_cube(), edited_tetrahedron()]).chain((0..60).map(random_mesh))
+    }
 
     /// Boxes and plates of whole patches hold what is diced at any rate, and parts' boxes what of it is theirs.
     #[test]
     fn what_is_diced_lies_in_boxes_and_plates() {
-        let (mut dicer, mut grid, mut n) = (Dicer::default(), LatticeGrid::default(), 0);
-        for mesh in shapes::all().into_iter().map(|(_, mesh)| mesh).chain((0..60).map(random_mesh)) {
+        let (mut dicer, mut n) = (Dicer::default(), 0);
+        for mesh in meshes() {
             let surface = Surface::new(&mesh, 1).unwrap();
             for patch in surface.visible_patches() {
-                let Envelope { bounds, plate } = dicer.patch_envelope(&surface, patch, 3);
+                let whole = dicer.patch_envelope(&surface, patch, 3);
                 let rates = surface.uniform_rates(patch, 1 + patch.0 % 9);
-                dicer.dice(&surface, patch, &rates, [0, rates.n_u], [0, rates.n_v], &mut grid);
-                assert_eq!(Envelope { bounds, plate }, dicer.patch_envelope(&surface, patch, 3));
-                let part = dicer.envelope(&surface, patch, &rates, [0, rates.n_u], [0, rates.n_v], 0);
-                for p in grid.points().map(|p| DVec3::from_array(p.map(f64::from))) {
-                    for Envelope { bounds: b, plate } in [Envelope { bounds, plate }, part] {
-                        let height = Plate::height(plate.normal, p);
-                        assert!(
-                            (f64::from(plate.low)..=f64::from(plate.high)).contains(&height),
-                            "{patch:?} {plate:?}"
-                        );
-                        assert!((b.min.as_dvec3().cmple(p) & p.cmple(b.max.as_dvec3())).all(), "{patch:?} {b:?} {p}");
-                    }
-                    n += 1;
-                }
+                let cells = [[0, rates.n_u], [0, rates.n_v]];
+                n += check(&mut dicer, &surface, patch, &rates, cells, whole);
+                assert_eq!(whole, dicer.patch_envelope(&surface, patch, 3));
+                let part = dicer.envelope(&surface, patch, &rates, cells[0], cells[1], 0);
+                check(&mut dicer, &surface, patch, &rates, cells, part);
             }
         }
         assert!(n > 30_000, "{n} vertices");
+    }
+
+    /// Checks that the vertices of these cells lie in the envelope; returns how many there are.
+    fn check(
+        dicer: &mut Dicer,
+        surface: &Surface,
+        patch: PatchId,
+        rates: &PatchRates,
+        cells: [[u32; 2]; 2],
+        e: Envelope,
+    ) -> usize {
+        let mut grid = LatticeGrid::default();
+        dicer.dice(surface, patch, rates, cells[0], cells[1], &mut grid);
+        for p in grid.points().map(|p| DVec3::from_array(p.map(f64::from))) {
+            let (height, b) = (Plate::height(e.plate.normal, p), e.bounds);
+            assert!((f64::from(e.plate.low)..=f64::from(e.plate.high)).contains(&height), "{patch:?} {cells:?} {e:?}");
+            assert!((b.min.as_dvec3().cmple(p) & p.cmple(b.max.as_dvec3())).all(), "{patch:?} {cells:?} {e:?} {p}");
+        }
+        grid.points().count()
+    }
+
+    /// Parts alone, at sides that move their vertices, and parts that are found together, each by its own normal.
+    #[test]
+    fn what_is_diced_of_parts_lies_in_their_envelopes() {
+        let (mut dicer, mut together, mut n, mut n_without) = (Dicer::default(), Vec::new(), [0; 2], 0);
+        for mesh in meshes() {
+            let surface = Surface::new(&mesh, 1).unwrap();
+            for patch in surface.visible_patches() {
+                let rates = PatchRates::new([0, 1, 2, 3].map(|side| [8, 3, 1, 5][(patch.idx() / (side + 1)) % 4]), 1);
+                let cut = |n: u32| [[0, n.div_ceil(2)], [n / 2, n]];
+                for (i, j) in cut(rates.n_u).into_iter().flat_map(|i| cut(rates.n_v).map(|j| (i, j))) {
+                    let alone = dicer.envelope(&surface, patch, &rates, i, j, 2);
+                    check(&mut dicer, &surface, patch, &rates, [i, j], alone);
+                    n[0] += 1;
+                }
+                let rates = PatchRates::new([8; 4], 1);
+                for side in [4, 2] {
+                    together.clear();
+                    let children = 8 / side;
+                    let out = &mut together;
+                    if !dicer.envelopes_of_parts(&surface, patch, &rates, [0, 0], [children; 2], side, 2, out) {
+                        continue;
+                    }
+                    for (part, e) in (0..).zip(&together) {
+                        let cells = [part % children, part / children].map(|k| [side * k, side * (k + 1)]);
+                        check(&mut dicer, &surface, patch, &rates, cells, *e);
+                        n_without += usize::from(e.plate.normal == [0; 3]);
+                        n[1] += 1;
+                    }
+                }
+            }
+        }
+        assert!(n[0] > 5_000 && n[1] > 20_000 && 20 * n_without < n[1], "{n:?} parts, {n_without} without a normal");
     }
 
     /// A plane that is no axis's: its patches are as thick as rounding makes them, and their boxes are cubes.
@@ -615,7 +665,7 @@ mod tests {
         let at = |k: usize| DVec3::new((k % 6) as f64, (k / 6) as f64, 0.0);
         let turned = |p: DVec3| glam::DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 0.8) * p;
         let faces: Vec<Vec<u32>> = (0..25).map(|k| k / 5 * 6 + k % 5).map(|a| vec![a, a + 1, a + 7, a + 6]).collect();
-        let mesh = crate::mesh::ControlMesh::from_polygons((0..36).map(at).map(turned).collect(), &faces).unwrap();
+        let mesh = ControlMesh::from_polygons((0..36).map(at).map(turned).collect(), &faces).unwrap();
         let surface = Surface::new(&mesh, 1).unwrap();
         for patch in surface.visible_patches() {
             let Envelope { bounds, plate } = Dicer::default().patch_envelope(&surface, patch, 3);

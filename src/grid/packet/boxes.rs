@@ -1,9 +1,9 @@
 //! Packets against the sixteen boxes of a head.
 
 use super::{PACKET, RayPacket};
-use crate::grid::boxes::{ALL_X, ALL_Y, ALL_Z, Head, LaneHits};
+use crate::grid::boxes::{Head, LaneHits};
 use crate::grid::{NodeView, Plane};
-use crate::math::simd::Kernel;
+use crate::math::simd::{Kernel, spread};
 
 /// The planes of sixteen boxes where the rays of a packet enter and leave, by axis, as distances from the origin.
 #[derive(Clone, Copy, Debug)]
@@ -137,11 +137,7 @@ impl<K: Kernel> SeenPlanes<K> {
         let frame = head.frame();
         let base = k.sub(k.floats_twice(frame), k.load(origin));
         let step = k.scaled_twice(k.splat(1.0), frame[3]);
-        Self {
-            planes,
-            base: [k.shuffle::<ALL_X>(base), k.shuffle::<ALL_Y>(base), k.shuffle::<ALL_Z>(base)],
-            step: [k.shuffle::<ALL_X>(step), k.shuffle::<ALL_Y>(step), k.shuffle::<ALL_Z>(step)],
-        }
+        Self { planes, base: spread(k, base), step: spread(k, step) }
     }
 
     /// How far from the origin the planes of eight boxes lie.

@@ -275,5 +275,11 @@ pub fn run<T: Task>(task: T) -> T::Output {
     Best::detect().run(task)
 }
 
+/// x, y and z of four lanes twice, each in all lanes.
+#[inline(always)]
+pub fn spread<K: Kernel>(k: K, x: K::F) -> [K::F; 3] {
+    [k.shuffle::<0b00_00_00_00>(x), k.shuffle::<0b01_01_01_01>(x), k.shuffle::<0b10_10_10_10>(x)]
+}
+
 #[cfg(test)]
 mod tests;

@@ -1,11 +1,10 @@
 //! Plates of leaves ([`Plates`] has the idea): each node has those of its leaves, as seen from the middles of their
 //! boxes.
 
-use super::traverse::spread;
 use super::{EMPTY, LEAF, NodeBoxes, Nodes, Refs, TopLevel};
 use crate::grid::{ExactPlates, LatticeRay, Plates};
 use crate::math::Plate;
-use crate::math::simd::Kernel;
+use crate::math::simd::{Kernel, spread};
 use crate::parallel::for_each;
 use glam::DVec3;
 use parking_lot::Mutex;

@@ -4,7 +4,7 @@ use super::plates::SpreadRay;
 use super::{LANES, LEAF, LeafRef, LeafWalk, NodeBoxes, Refs, TopLevel};
 use crate::grid::{LatticeRay, Plane, Plates};
 use crate::ids::PatchId;
-use crate::math::simd::{Kernel, place};
+use crate::math::simd::{Kernel, place, spread};
 
 /// The stacks of traversals, kept by each thread so that no ray allocates.
 #[derive(Clone, Debug, Default)]
@@ -318,12 +318,6 @@ impl<K: Kernel> Slabs<K> {
         }
         (enter, leave)
     }
-}
-
-/// x, y and z, each in all lanes.
-#[inline(always)]
-pub(super) fn spread<K: Kernel>(k: K, x: K::F) -> [K::F; 3] {
-    [k.shuffle::<0b00_00_00_00>(x), k.shuffle::<0b01_01_01_01>(x), k.shuffle::<0b10_10_10_10>(x)]
 }
 
 impl NodeBoxes {
