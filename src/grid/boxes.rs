@@ -141,12 +141,12 @@ impl Head {
     /// The middle of a lane's box as it is tested, without the ray's slack.
     #[inline(always)]
     pub fn middle_of(&self, lane: usize) -> DVec3 {
-        let mut middle = [0.0; 3];
-        for (k, middle) in middle.iter_mut().enumerate() {
+        let mut out = [0.0; 3];
+        for (k, middle) in out.iter_mut().enumerate() {
             let sum = u32::from(self.planes[k][lane]) + u32::from(self.planes[k + 3][lane]);
             *middle = f64::from(self.base[k]) + 0.5 * f64::from((sum << self.exponent[k]) as i32);
         }
-        DVec3::from_array(middle)
+        DVec3::from_array(out)
     }
 
     /// The box of a lane as it is tested, without the ray's slack.

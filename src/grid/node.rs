@@ -197,13 +197,13 @@ impl<K: Kernel> Through<K> {
     /// Where the origin lies from the middles of eight boxes.
     #[inline(always)]
     fn seen_from_middles(&self, k: K, planes: &[[u8; 4]; 22]) -> [K::F; 3] {
-        let mut from = self.origin;
-        for (axis, from) in from.iter_mut().enumerate() {
+        let mut seen = self.origin;
+        for (axis, from) in seen.iter_mut().enumerate() {
             let low: &[[u8; 4]; 2] = planes[4 * axis..4 * axis + 2].try_into().expect("two units");
             let high: &[[u8; 4]; 2] = planes[4 * axis + 12..4 * axis + 14].try_into().expect("two units");
             let sum = k.add(k.widen(bytemuck::cast_ref(low)), k.widen(bytemuck::cast_ref(high)));
             *from = k.mul_add(sum, self.half_step[axis], *from);
         }
-        from
+        seen
     }
 }

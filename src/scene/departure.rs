@@ -386,7 +386,6 @@ impl<'v> Left<'_, 'v, '_, '_> {
     #[inline(always)]
     fn cells(&mut self) -> CellRect {
         match self.visit.peek(self.root) {
-            // In the head, which nodes and pieces have in common.
             Some(block) => cells_of(block.bytes()),
             None => self.builder.cells_of(self.of),
         }

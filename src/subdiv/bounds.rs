@@ -1,7 +1,7 @@
 //! Conservative boxes of parts of patches, and bounds of their heights, without evaluating them.
 
 use super::eval::{Evaluator, Point, quarter, sample_regular};
-use super::extent::{Extent, Reach, with_heights};
+use super::extent::{Extent, PartExtent, with_heights};
 use super::parts::Parts;
 use super::plan::{NodeId, Plan, PlanLibrary, Step};
 use super::pole::{self, MOST_REFINED, PoleHull};
@@ -198,7 +198,7 @@ impl Evaluator {
 }
 
 /// How far equal parts reach: part (a, b) at `MOST_PARTS * b + a`.
-pub(super) type GridReaches = [Reach; MOST_PARTS * MOST_PARTS];
+pub(super) type GridExtents = [PartExtent; MOST_PARTS * MOST_PARTS];
 
 impl Evaluator {
     /// How far `side` x `side` equal parts (1, 2 or 4) of the part `[u0,u1] x [v0,v1]` of an irregular patch reach,
@@ -211,7 +211,7 @@ impl Evaluator {
         [u, v]: [[f64; 2]; 2],
         side: usize,
         depth: u32,
-        out: &mut GridReaches,
+        out: &mut GridExtents,
     ) -> bool {
         self.bound_grid(library, parts, 0, [u, v], side, depth, 0, out)
     }
@@ -227,14 +227,14 @@ impl Evaluator {
         side: usize,
         depth: u32,
         first: usize,
-        out: &mut GridReaches,
+        out: &mut GridExtents,
     ) -> bool {
         if side == 1 {
             let normal = Plate::normal_along(match parts.control(part) {
                 Some(control) => normal_in_the_middle(control, u, v),
                 None => parts.normal(part),
             });
-            out[first] = Reach { normal, ..Reach::EMPTY };
+            out[first] = PartExtent { normal, ..PartExtent::EMPTY };
             self.bound_parts(library, parts, part, normal, [u, v], depth, &mut out[first].extent);
             return true;
         }
@@ -265,7 +265,7 @@ impl Evaluator {
         control: &ControlPoints,
         [u, v]: [[f64; 2]; 2],
         side: usize,
-        out: &mut [Reach],
+        out: &mut [PartExtent],
     ) {
         let [of_u, of_v] = &mut self.hulls;
         let (u, v) = (of_u.get(u), of_v.get(v));

@@ -10,9 +10,9 @@
 //! the guard and the other just outside, they still agree: the owner's value lies within the evaluation error, far less
 //! than the guard, of one that is a whole guard away from the boundary.
 
-use super::bounds::GridReaches;
+use super::bounds::GridExtents;
 use super::eval::{Evaluator, SurfaceSample};
-use super::extent::{Extent, Reach};
+use super::extent::{Extent, PartExtent};
 use super::regular::MOST_PARTS;
 use super::surface::{PatchPoints, Surface};
 use crate::ids::{FaceId, PatchId};
@@ -415,12 +415,12 @@ impl Dicer {
         let lane = self.load(surface, patch);
         let rectangle = [0, 1].map(|k| range([from[k], from[k] + n[k] * side], cells[k]));
         let n = n[0] as usize;
-        let mut reaches = [Reach::EMPTY; MOST_PARTS * MOST_PARTS];
+        let mut extents = [PartExtent::EMPTY; MOST_PARTS * MOST_PARTS];
         let points = &mut self.points[lane];
-        if !surface.grid_of_parts(points, &mut self.evaluator, rectangle, n, depth, &mut reaches) {
+        if !surface.grid_of_parts(points, &mut self.evaluator, rectangle, n, depth, &mut extents) {
             return false;
         }
-        simd::run(LatticeEnvelopes { reaches: &reaches, n, out });
+        simd::run(LatticeEnvelopes { extents: &extents, n, out });
         true
     }
 
@@ -445,7 +445,7 @@ fn in_lattice(normal: [i8; 3], extent: &Extent) -> Envelope {
 
 /// Appends what vertices of `n` x `n` parts lie in.
 struct LatticeEnvelopes<'a> {
-    reaches: &'a GridReaches,
+    extents: &'a GridExtents,
     n: usize,
     out: &'a mut Vec<Envelope>,
 }
@@ -454,9 +454,9 @@ impl Task for LatticeEnvelopes<'_> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) {
-        let Self { reaches, n, out } = self;
-        for row in reaches.chunks_exact(MOST_PARTS).take(n) {
-            for Reach { extent, normal } in &row[..n] {
+        let Self { extents, n, out } = self;
+        for row in extents.chunks_exact(MOST_PARTS).take(n) {
+            for PartExtent { extent, normal } in &row[..n] {
                 let bounds = LatticeBox { extent }.run(k);
                 out.push(Envelope { bounds, plate: to_lattice_plate(*normal, extent) });
             }

@@ -42,14 +42,14 @@ impl Extent {
 
 /// How far a part of a patch reaches, with heights along a normal of its own.
 #[derive(Clone, Copy, Debug)]
-pub struct Reach {
+pub struct PartExtent {
     /// How far, and how high.
     pub extent: Extent,
     /// What heights are measured along; zero where there is none.
     pub normal: [i8; 3],
 }
 
-impl Reach {
+impl PartExtent {
     /// That of no point.
     pub const EMPTY: Self = Self { extent: Extent::EMPTY, normal: [0; 3] };
 }

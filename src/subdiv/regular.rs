@@ -1,7 +1,7 @@
 //! Uniform bicubic B-spline patches: evaluation, derivatives, and the Bézier hull of a part.
 
 use super::eval::Point;
-use super::extent::{Extent, Reach};
+use super::extent::{Extent, PartExtent};
 use super::parts::across;
 use crate::math::point_grid::LANES;
 use crate::math::simd::{self, Kernel, Task};
@@ -345,7 +345,7 @@ pub(super) struct GridHulls<'a, const SIDE: usize> {
     pub u: &'a BezierWeights,
     pub v: &'a BezierWeights,
     /// Part (a, b) at `MOST_PARTS * b + a`.
-    pub out: &'a mut [Reach],
+    pub out: &'a mut [PartExtent],
 }
 
 /// How far the quarters of a patch reach together: low, high. Heights are those of the control points.
@@ -430,7 +430,7 @@ fn ends_of_row<K: Kernel>(k: K, [p, q, r, s]: [K::D; 4]) -> (K::D, K::D) {
 
 /// How far 16 points reach, with heights across their corners.
 #[inline(always)]
-fn reach<K: Kernel>(k: K, rows: [[K::D; 4]; 4]) -> Reach {
+fn part_extent<K: Kernel>(k: K, rows: [[K::D; 4]; 4]) -> PartExtent {
     let (mut low, mut high) = ends_of_row(k, rows[0]);
     for row in &rows[1..] {
         let (l, h) = ends_of_row(k, *row);
@@ -455,7 +455,7 @@ fn reach<K: Kernel>(k: K, rows: [[K::D; 4]; 4]) -> Reach {
     low.0[3] = p.min(q).min(r.min(s));
     let [p, q, r, s] = k.store4(highest);
     high.0[3] = p.max(q).max(r.max(s));
-    Reach { extent: Extent { low, high }, normal }
+    PartExtent { extent: Extent { low, high }, normal }
 }
 
 impl<const SIDE: usize> Task for GridHulls<'_, SIDE> {
@@ -470,7 +470,7 @@ impl<const SIDE: usize> Task for GridHulls<'_, SIDE> {
             let last = row(k, u, &columns, b, 3);
             let (second, third) = (row(k, u, &columns, b, 1), row(k, u, &columns, b, 2));
             for (a, out) in out[MOST_PARTS * b..].iter_mut().take(SIDE).enumerate() {
-                *out = reach(k, [first[a], second[a], third[a], last[a]]);
+                *out = part_extent(k, [first[a], second[a], third[a], last[a]]);
             }
             first = last;
         }
@@ -565,18 +565,18 @@ mod tests {
     fn a_grid_reaches_as_far_as_its_parts() {
         let c = control_points();
         for (side, u, v) in [(2, [0.5, 0.75], [0.0, 1.0]), (4, [0.0, 1.0], [0.0, 0.5])] {
-            let mut out = [Reach::EMPTY; MOST_PARTS * MOST_PARTS];
-            let (control, of_u, of_v, reaches) = (&c, &bezier_weights(u), &bezier_weights(v), &mut out[..]);
+            let mut out = [PartExtent::EMPTY; MOST_PARTS * MOST_PARTS];
+            let (control, of_u, of_v, extents) = (&c, &bezier_weights(u), &bezier_weights(v), &mut out[..]);
             match side {
-                2 => run(GridHulls::<2> { control, u: of_u, v: of_v, out: reaches }),
-                _ => run(GridHulls::<4> { control, u: of_u, v: of_v, out: reaches }),
+                2 => run(GridHulls::<2> { control, u: of_u, v: of_v, out: extents }),
+                _ => run(GridHulls::<4> { control, u: of_u, v: of_v, out: extents }),
             }
             for (a, b) in (0..side).flat_map(|b| (0..side).map(move |a| (a, b))) {
                 let part = |[low, high]: [f64; 2], i: usize| {
                     let step = (high - low) / side as f64;
                     bezier_weights([low + step * i as f64, low + step * (i + 1) as f64])
                 };
-                let Reach { extent: Extent { low, high }, normal } = out[MOST_PARTS * b + a];
+                let PartExtent { extent: Extent { low, high }, normal } = out[MOST_PARTS * b + a];
                 let control = with_heights(&c, normal);
                 let expected = run(Hull { control: &control, u: &part(u, a), v: &part(v, b) });
                 let far = (low - expected[0]).max_abs().max((high - expected[1]).max_abs());

@@ -1,6 +1,6 @@
 //! One mesh ready for evaluation: topology, control points in lattice units, and the plan of every face.
 
-use super::bounds::GridReaches;
+use super::bounds::GridExtents;
 use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, sample_regular};
 use super::extent::{Extent, with_heights};
@@ -376,10 +376,12 @@ impl Surface {
         v: [f64; 2],
     ) -> [i8; 3] {
         let is_whole = [u, v] == [[0.0, 1.0]; 2] && points.node != EDITED;
-        Plate::normal_along(match points.regular_control() {
-            _ if !is_whole => self.normal(points, evaluator, 0.5 * (u[0] + u[1]), 0.5 * (v[0] + v[1])),
-            Some(control) => across(limit_corners(control).map(Point::to_vec)),
-            None => points.parts.normal(0),
+        Plate::normal_along(if !is_whole {
+            self.normal(points, evaluator, 0.5 * (u[0] + u[1]), 0.5 * (v[0] + v[1]))
+        } else if let Some(control) = points.regular_control() {
+            across(limit_corners(control).map(Point::to_vec))
+        } else {
+            points.parts.normal(0)
         })
     }
 
@@ -414,7 +416,7 @@ impl Surface {
         rectangle: [[f64; 2]; 2],
         side: usize,
         depth: u32,
-        out: &mut GridReaches,
+        out: &mut GridExtents,
     ) -> bool {
         if points.node == REGULAR {
             evaluator.regular_grid_of_parts(&points.control, rectangle, side, out);
