@@ -8,7 +8,7 @@ use lazytess::grid::{CellRect, PieceLayout, encode_node, node_bytes};
 use lazytess::ids::{PatchId, VertexId};
 use lazytess::math::{Envelope, LatticeGrid};
 use lazytess::mesh::{ControlMesh, Crease, shapes};
-use lazytess::subdiv::{Dicer, PatchRates, Surface};
+use lazytess::subdiv::{Dicer, EqualParts, PatchRates, Surface};
 
 /// Cells of a piece along its sides.
 const PIECE: u32 = 8;
@@ -81,8 +81,8 @@ impl Builder {
     /// The node over a patch.
     fn node(&mut self, surface: &Surface, patch: PatchId, rates: &PatchRates) {
         self.envelopes.clear();
-        let (part, out) = ([2, 2], &mut self.envelopes);
-        assert!(self.dicer.envelopes_of_parts(surface, patch, rates, [0, 0], part, PIECE, 4, out));
+        let parts = EqualParts { from: [0, 0], n: [2, 2], side: PIECE };
+        assert!(self.dicer.envelopes_of_parts(surface, patch, rates, parts, 4, &mut self.envelopes));
         let cells = CellRect { i0: 0, j0: 0, i1: RATE as u16, j1: RATE as u16 };
         let children = [2, 2];
         let block = &mut bytemuck::cast_slice_mut(&mut self.block)[..node_bytes(children)];

@@ -9,7 +9,7 @@ use crate::grid::{
 };
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Envelope, LatticeGrid};
-use crate::subdiv::{Dicer, PatchRates, snapped};
+use crate::subdiv::{Dicer, EqualParts, PatchRates, snapped};
 
 /// Children of a node along u and v.
 pub(super) const NODE_SIDE: u32 = 4;
@@ -180,12 +180,12 @@ impl<'w> Builder<'w> {
         // A child's cells are a part of the patch: as many splits lead to a quarter of its size.
         let depth = (rates.n_u.max(rates.n_v) / side).max(1).ilog2() + CHILD_BOX_DEPTH;
         self.envelopes.clear();
-        let (surface, from) = (of.mesh.surface(), [u32::from(cells.i0), u32::from(cells.j0)]);
-        let n = [n_u, n_v];
+        let surface = of.mesh.surface();
+        let parts = EqualParts { from: [u32::from(cells.i0), u32::from(cells.j0)], n: [n_u, n_v], side };
         let no_holes = !surface.edited().has_holes();
         let out = &mut self.envelopes;
-        if no_holes && self.dicer.envelopes_of_parts(surface, of.patch, rates, from, n, side, depth, out) {
-            return n.map(|n| n as u8);
+        if no_holes && self.dicer.envelopes_of_parts(surface, of.patch, rates, parts, depth, out) {
+            return [n_u as u8, n_v as u8];
         }
         for b in 0..n_v {
             for a in 0..n_u {

@@ -157,6 +157,16 @@ pub(super) struct Start {
     above: f32,
 }
 
+/// A ray that leaves a patch, and what it takes to look around from there.
+struct Departing<'a, 'w> {
+    ray: &'a LatticeRay,
+    at: Start,
+    of: PatchContext<'a>,
+    cache: &'a GridCache,
+    builder: &'a mut Builder<'w>,
+    pin: &'a mut Pin<'w>,
+}
+
 impl<'c> Leaving<'c> {
     /// A ray that may meet whatever is there.
     pub const NOTHING: Self = Self { patch: PatchId(u32::MAX), unknown: None };
@@ -169,7 +179,7 @@ impl<'c> Leaving<'c> {
         (id, mesh): (MeshId, &WorldMesh),
         in_lattice: &LatticeRay,
         cache: &'c GridCache,
-        (builder, pin): (&mut Builder<'_>, &mut Pin<'_>),
+        (builder, pin): (&mut Builder<'c>, &mut Pin<'c>),
     ) -> Self {
         let departures = cache.departures();
         let Some(at @ Start { number, patch, .. }) = start else { return Self::NOTHING };
@@ -179,7 +189,7 @@ impl<'c> Leaving<'c> {
         let horizon = Horizon::from_words(words);
         if in_lattice.is_one_in(RAYS_PER_COUNT) {
             let of = PatchContext { id, mesh, patch };
-            departures.ask_for_skyline(in_lattice, horizon, at, of, cache, builder, pin);
+            departures.ask_for_skyline(horizon, Departing { ray: in_lattice, at, of, cache, builder, pin });
         }
         if horizon.is_cleared_by(k, in_lattice) { Self { patch, unknown: None } } else { Self::NOTHING }
     }
@@ -270,24 +280,15 @@ impl Departures {
     /// once enough more have not cleared that.
     #[cold]
     #[inline(never)]
-    #[allow(clippy::too_many_arguments)]
-    fn ask_for_skyline(
-        &self,
-        ray: &LatticeRay,
-        horizon: Horizon,
-        start: Start,
-        of: PatchContext<'_>,
-        cache: &GridCache,
-        builder: &mut Builder<'_>,
-        pin: &mut Pin<'_>,
-    ) {
-        if !horizon.is_on_side_of(ray) {
+    fn ask_for_skyline(&self, horizon: Horizon, departing: Departing<'_, '_>) {
+        if !horizon.is_on_side_of(departing.ray) {
             return;
         }
-        if let Some(words) = self.skylines.get(start.number) {
-            return self.ask_for_part(ray, start, Skyline::from_words(words), of, cache, builder, pin);
+        let number = departing.at.number;
+        if let Some(words) = self.skylines.get(number) {
+            return self.ask_for_part(Skyline::from_words(words), departing);
         }
-        let number = start.number;
+        let Departing { ray, of, cache, builder, pin, .. } = departing;
         if !self.skylines.is_due(number, may_replace(ray), || rays_counted(RAYS_BEFORE_SKYLINE, of, builder)) {
             return;
         }
@@ -310,17 +311,8 @@ impl Departures {
     }
 
     /// As [`ask_for_skyline`](Self::ask_for_skyline) for the part where the ray starts.
-    #[allow(clippy::too_many_arguments)]
-    fn ask_for_part(
-        &self,
-        ray: &LatticeRay,
-        Start { number, cell, above, .. }: Start,
-        of_patch: Skyline,
-        of: PatchContext<'_>,
-        cache: &GridCache,
-        builder: &mut Builder<'_>,
-        pin: &mut Pin<'_>,
-    ) {
+    fn ask_for_part(&self, of_patch: Skyline, departing: Departing<'_, '_>) {
+        let Departing { ray, at: Start { number, cell, above, .. }, of, cache, builder, pin } = departing;
         let part = of_patch.part(cell);
         let number = number_of_part(number, part);
         if !self.part_skylines.is_due(number, may_replace(ray), || rays_counted(RAYS_BEFORE_PART, of, builder)) {

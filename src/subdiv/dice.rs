@@ -10,9 +10,9 @@
 //! the guard and the other just outside, they still agree: the owner's value lies within the evaluation error, far less
 //! than the guard, of one that is a whole guard away from the boundary.
 
-use super::bounds::GridExtents;
+use super::bounds::{AskedGrid, GridExtents};
 use super::eval::{Evaluator, SurfaceSample};
-use super::extent::{Extent, PartExtent};
+use super::extent::{AskedPart, Extent, PartExtent};
 use super::regular::MOST_PARTS;
 use super::surface::{PatchPoints, Surface};
 use crate::ids::{FaceId, PatchId};
@@ -134,6 +134,17 @@ impl Surface {
 /// patches around them.
 const N_REMEMBERED: usize = 16;
 
+/// Equal parts of a patch's cells, side by side.
+#[derive(Clone, Copy, Debug)]
+pub struct EqualParts {
+    /// The first cell along u and v.
+    pub from: [u32; 2],
+    /// Parts along u and v.
+    pub n: [u32; 2],
+    /// Cells along a side of each.
+    pub side: u32,
+}
+
 /// Turns parts of patches into lattice vertices. Holds scratch memory and the last patches: keep one per thread.
 #[derive(Debug, Default)]
 pub struct Dicer {
@@ -189,6 +200,44 @@ impl SidePoint {
     }
 }
 
+/// The points of some cells' grid that lie on a side of the patch.
+#[derive(Clone, Copy)]
+struct TouchedSide {
+    side: usize,
+    /// The first of them, counted along the side.
+    first: u32,
+    n_points: usize,
+    /// Cells of the patch along the side.
+    n: u32,
+    /// How far across they lie in the grid.
+    across: usize,
+}
+
+impl TouchedSide {
+    /// `None` if the cells (along u and v) do not touch the side.
+    #[inline(always)]
+    fn new(side: usize, rates: &PatchRates, cells: [[u32; 2]; 2]) -> Option<Self> {
+        let (axis, is_far) = (side % 2, side == 1 || side == 2);
+        let n = [rates.n_u, rates.n_v];
+        let ([first, last], [near, far]) = (cells[axis], cells[1 - axis]);
+        let is_touched = if is_far { far == n[1 - axis] } else { near == 0 };
+        let across = if is_far { (far - near) as usize } else { 0 };
+        is_touched.then_some(Self { side, first, n_points: (last - first + 1) as usize, n: n[axis], across })
+    }
+
+    /// The one along the side: 0 for u, 1 for v.
+    #[inline(always)]
+    fn axis(&self) -> usize {
+        self.side % 2
+    }
+
+    /// Where in the grid its points lie.
+    #[inline(always)]
+    fn place(&self, along: usize) -> [usize; 2] {
+        if self.axis() == 0 { [along, self.across] } else { [self.across, along] }
+    }
+}
+
 /// The edge point that border vertex `i` of `n` snaps to where the side has only `rate` segments.
 pub fn snapped(i: u32, n: u32, rate: u32) -> u32 {
     ((2 * u64::from(i) * u64::from(rate) + u64::from(n)) / (2 * u64::from(n))) as u32
@@ -220,53 +269,49 @@ impl Dicer {
         surface.grid(&mut self.points[lane], &mut self.evaluator, cells, us, vs, &mut self.out);
         let has_near = out.round(&self.out, ROUNDING);
         for side in [0, 2, 3, 1] {
-            self.settle_side(surface, patch, rates, side, [[i0, i1], [j0, j1]], has_near, out);
+            let Some(points) = TouchedSide::new(side, rates, [[i0, i1], [j0, j1]]) else { continue };
+            if rates.sides[side] != points.n {
+                self.move_to_edge(surface, patch, rates, points, out);
+            } else if has_near {
+                self.ask_owners(surface, patch, rates, points, out);
+            }
         }
     }
 
-    /// Makes the vertices of a side what both of its patches agree on, if the part `cells` (along u and v) touches that
-    /// side. `has_near`: whether any of them may be within the guard of a rounding boundary.
-    #[allow(clippy::too_many_arguments)]
-    fn settle_side(
+    /// Moves vertices on a side to the points of its edge, which has fewer segments than the grid.
+    fn move_to_edge(
         &mut self,
         surface: &Surface,
         patch: PatchId,
         rates: &PatchRates,
-        side: usize,
-        cells: [[u32; 2]; 2],
-        has_near: bool,
+        at: TouchedSide,
         out: &mut LatticeGrid,
     ) {
-        let (axis, is_far) = (side % 2, side == 1 || side == 2);
-        let n = [rates.n_u, rates.n_v];
-        let ([first, last], [near, far]) = (cells[axis], cells[1 - axis]);
-        let is_touched = if is_far { far == n[1 - axis] } else { near == 0 };
-        if !is_touched {
-            return;
+        let index = |along: usize| snapped(at.first + along as u32, at.n, rates.sides[at.side]);
+        self.find_side(surface, patch, rates, at.side, [index(0), index(at.n_points - 1)]);
+        for along in 0..at.n_points {
+            let [i, j] = at.place(along);
+            out.set(i, j, self.side[(index(along) - index(0)) as usize]);
         }
-        let across = if is_far { (far - near) as usize } else { 0 };
-        let place = |along: usize| if axis == 0 { [along, across] } else { [across, along] };
-        let at = |along: usize| SidePoint { side, index: first + along as u32, rate: n[axis] };
-        let n_points = (last - first + 1) as usize;
-        if rates.sides[side] != n[axis] {
-            // Its vertices move to points of an edge that has fewer segments than the grid.
-            let index = |along: usize| snapped(first + along as u32, n[axis], rates.sides[side]);
-            self.find_side(surface, patch, rates, side, [index(0), index(n_points - 1)]);
-            for along in 0..n_points {
-                let [i, j] = place(along);
-                out.set(i, j, self.side[(index(along) - index(0)) as usize]);
-            }
-            return;
-        }
-        if !has_near {
-            return;
-        }
+    }
+
+    /// Gives those vertices on a side that are within the guard of a rounding boundary what their owners say.
+    fn ask_owners(
+        &mut self,
+        surface: &Surface,
+        patch: PatchId,
+        rates: &PatchRates,
+        at: TouchedSide,
+        out: &mut LatticeGrid,
+    ) {
+        let TouchedSide { side, first, n, n_points, .. } = at;
         for start in (0..n_points).step_by(MOST_NEAR) {
-            let mut near = ROUNDING.near(&self.out, place(start), axis, (n_points - start).min(MOST_NEAR));
+            let mut near = ROUNDING.near(&self.out, at.place(start), at.axis(), (n_points - start).min(MOST_NEAR));
             while near != 0 {
                 let along = start + near.trailing_zeros() as usize;
-                let [i, j] = place(along);
-                out.set(i, j, self.owner.side_point(surface, patch, rates, at(along)));
+                let [i, j] = at.place(along);
+                let point = SidePoint { side, index: first + along as u32, rate: n };
+                out.set(i, j, self.owner.side_point(surface, patch, rates, point));
                 near &= near - 1;
             }
         }
@@ -365,7 +410,7 @@ impl Dicer {
         let lane = self.load(surface, patch);
         let points = &mut self.points[lane];
         let (u, v) = (range(i, rates.n_u), range(j, rates.n_v));
-        let mut extent = surface.extent(points, &mut self.evaluator, normal, u, v, depth);
+        let mut extent = surface.extent(points, &mut self.evaluator, AskedPart { range: [u, v], normal, depth });
         let snap = |[a, b]: [u32; 2], n: u32, r: u32| range([snapped(a, n, r), snapped(b, n, r)], r);
         for side in 0..4 {
             let (touches, n, along) = match side {
@@ -379,33 +424,31 @@ impl Dicer {
             // What of the side lies within the cells' own parameters is in their box already.
             if touches && (t[0] < own[0] || t[1] > own[1]) {
                 let t = [if t[0] < own[0] { t[0] } else { own[1] }, if t[1] > own[1] { t[1] } else { own[0] }];
-                let (u, v) = match side {
-                    0 => (t, [0.0; 2]),
-                    1 => ([1.0; 2], t),
-                    2 => (t, [1.0; 2]),
-                    _ => ([0.0; 2], t),
+                let range = match side {
+                    0 => [t, [0.0; 2]],
+                    1 => [[1.0; 2], t],
+                    2 => [t, [1.0; 2]],
+                    _ => [[0.0; 2], t],
                 };
-                extent = extent.union(surface.extent(points, &mut self.evaluator, normal, u, v, depth));
+                let asked = AskedPart { range, normal, depth };
+                extent = extent.union(surface.extent(points, &mut self.evaluator, asked));
             }
         }
         extent
     }
 
-    /// Appends the [envelopes](Self::envelope) of `n[0]` x `n[1]` parts of `side` x `side` cells from (`from[0]`,
-    /// `from[1]`) on, if they can be found together: where a square of two or four parts a side has no side that is
-    /// coarser than its cells. Returns whether that is so.
-    #[allow(clippy::too_many_arguments)]
+    /// Appends the [envelopes](Self::envelope) of equal parts, if they can be found together: where a square of two or
+    /// four parts a side has no side that is coarser than its cells. Returns whether that is so.
     pub fn envelopes_of_parts(
         &mut self,
         surface: &Surface,
         patch: PatchId,
         rates: &PatchRates,
-        from: [u32; 2],
-        n: [u32; 2],
-        side: u32,
+        parts: EqualParts,
         depth: u32,
         out: &mut Vec<Envelope>,
     ) -> bool {
+        let EqualParts { from, n, side } = parts;
         let cells = [rates.n_u, rates.n_v];
         let is_plain = (0..4).all(|k| rates.sides[k] == cells[k % 2]);
         let is_whole = (0..2).all(|k| from[k] + n[k] * side <= cells[k]);
@@ -414,13 +457,12 @@ impl Dicer {
         }
         let lane = self.load(surface, patch);
         let rectangle = [0, 1].map(|k| range([from[k], from[k] + n[k] * side], cells[k]));
-        let n = n[0] as usize;
+        let asked = AskedGrid { range: rectangle, side: n[0] as usize, depth };
         let mut extents = [PartExtent::EMPTY; MOST_PARTS * MOST_PARTS];
-        let points = &mut self.points[lane];
-        if !surface.grid_of_parts(points, &mut self.evaluator, rectangle, n, depth, &mut extents) {
+        if !surface.grid_of_parts(&mut self.points[lane], &mut self.evaluator, asked, &mut extents) {
             return false;
         }
-        simd::run(LatticeEnvelopes { extents: &extents, n, out });
+        simd::run(LatticeEnvelopes { extents: &extents, n: asked.side, out });
         true
     }
 
@@ -429,7 +471,7 @@ impl Dicer {
         let lane = self.load(surface, patch);
         let (points, evaluator, whole) = (&mut self.points[lane], &mut self.evaluator, [0.0, 1.0]);
         let normal = surface.normal_of_part(points, evaluator, whole, whole);
-        in_lattice(normal, &surface.extent(points, evaluator, normal, whole, whole, depth))
+        in_lattice(normal, &surface.extent(points, evaluator, AskedPart::whole(normal, depth)))
     }
 }
 
@@ -643,8 +685,8 @@ mod tests {
                 for side in [4, 2] {
                     together.clear();
                     let children = 8 / side;
-                    let out = &mut together;
-                    if !dicer.envelopes_of_parts(&surface, patch, &rates, [0, 0], [children; 2], side, 2, out) {
+                    let parts = EqualParts { from: [0, 0], n: [children; 2], side };
+                    if !dicer.envelopes_of_parts(&surface, patch, &rates, parts, 2, &mut together) {
                         continue;
                     }
                     for (part, e) in (0..).zip(&together) {

@@ -1,9 +1,9 @@
 //! One mesh ready for evaluation: topology, control points in lattice units, and the plan of every face.
 
-use super::bounds::GridExtents;
+use super::bounds::{AskedGrid, GridExtents};
 use super::edits::{EditSites, EditTree, EditedPatches, control_positions};
 use super::eval::{Evaluator, Point, SampleKind, SurfaceSample, sample_regular};
-use super::extent::{Extent, with_heights};
+use super::extent::{AskedPart, Extent, with_heights};
 use super::kinds::plan_faces;
 use super::local::RingWalker;
 use super::parts::{Parts, across};
@@ -386,43 +386,32 @@ impl Surface {
     }
 
     /// How far part of a patch reaches, in lattice units, and how high along a normal; see `Evaluator::parts_bounds`.
-    #[allow(clippy::too_many_arguments)]
-    pub fn extent(
-        &self,
-        points: &mut PatchPoints,
-        evaluator: &mut Evaluator,
-        normal: [i8; 3],
-        u: [f64; 2],
-        v: [f64; 2],
-        depth: u32,
-    ) -> Extent {
+    pub fn extent(&self, points: &mut PatchPoints, evaluator: &mut Evaluator, asked: AskedPart) -> Extent {
         if points.node == REGULAR {
-            evaluator.regular_extent(&with_heights(&points.control, normal), u, v)
+            evaluator.regular_extent(&with_heights(&points.control, asked.normal), asked.range)
         } else if let Some(tree) = self.tree(points) {
-            evaluator.edited_bounds(&self.plans, tree, normal, [u, v], depth)
+            evaluator.edited_bounds(&self.plans, tree, asked)
         } else {
-            evaluator.parts_bounds(&self.plans, &mut points.parts, normal, u, v, depth)
+            evaluator.parts_bounds(&self.plans, &mut points.parts, asked)
         }
     }
 }
 
 impl Surface {
-    /// How far `side` x `side` equal parts of a rectangle of parameters reach, in lattice units, where that can be had
-    /// together; see `Evaluator::grid_of_parts`. Returns whether it can.
+    /// How far equal parts of a rectangle of parameters reach, in lattice units, where that can be had together; see
+    /// `Evaluator::grid_of_parts`. Returns whether it can.
     pub(super) fn grid_of_parts(
         &self,
         points: &mut PatchPoints,
         evaluator: &mut Evaluator,
-        rectangle: [[f64; 2]; 2],
-        side: usize,
-        depth: u32,
+        asked: AskedGrid,
         out: &mut GridExtents,
     ) -> bool {
         if points.node == REGULAR {
-            evaluator.regular_grid_of_parts(&points.control, rectangle, side, out);
+            evaluator.regular_grid_of_parts(&points.control, asked, out);
             return true;
         }
-        points.node != EDITED && evaluator.grid_of_parts(&self.plans, &mut points.parts, rectangle, side, depth, out)
+        points.node != EDITED && evaluator.grid_of_parts(&self.plans, &mut points.parts, asked, out)
     }
 }
 

@@ -2,9 +2,8 @@
 
 use super::EditTree;
 use crate::math::PointGrid;
-use crate::subdiv::bounds::half_range;
 use crate::subdiv::eval::{Evaluator, LEFT_FIRST, SurfaceSample, Target, quarter, quarters_of};
-use crate::subdiv::extent::Extent;
+use crate::subdiv::extent::{AskedPart, Extent};
 use crate::subdiv::plan::PlanLibrary;
 
 impl Evaluator {
@@ -58,27 +57,12 @@ impl Evaluator {
     }
 
     /// As `bounds` for a patch under edits.
-    pub fn edited_bounds(
-        &mut self,
-        library: &PlanLibrary,
-        tree: &EditTree,
-        normal: [i8; 3],
-        [u, v]: [[f64; 2]; 2],
-        depth: u32,
-    ) -> Extent {
+    pub fn edited_bounds(&mut self, library: &PlanLibrary, tree: &EditTree, asked: AskedPart) -> Extent {
         match tree {
-            EditTree::Rest { node, ring } => self.bounds(library, *node, ring, normal, [u, v], depth),
-            EditTree::Split(quarters) => {
-                let mut bounds = Extent::EMPTY;
-                for (k, tree) in quarters.iter().enumerate() {
-                    let (x, y) = quarter(k);
-                    if let (Some(u), Some(v)) = (half_range(u, x), half_range(v, y)) {
-                        let depth = depth.saturating_sub(1);
-                        bounds = bounds.union(self.edited_bounds(library, tree, normal, [u, v], depth));
-                    }
-                }
-                bounds
-            }
+            EditTree::Rest { node, ring } => self.bounds(library, *node, ring, asked),
+            EditTree::Split(quarters) => asked.in_quarters().fold(Extent::EMPTY, |bounds, (k, asked)| {
+                bounds.union(self.edited_bounds(library, &quarters[k], asked))
+            }),
         }
     }
 }
