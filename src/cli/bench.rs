@@ -117,7 +117,7 @@ struct Report {
 impl BenchArgs {
     /// Measures and prints.
     pub fn run(&self) -> Result<()> {
-        check_outputs(&[self.hits.as_deref()], &[&self.mesh])?;
+        check_outputs(self.hits.as_deref(), [self.mesh.as_path()])?;
         let mesh = rounded_to_f32(self.edits.load_mesh(&self.mesh)?);
         let (faces, verts, bounds) = (mesh.n_faces(), mesh.positions.len(), mesh.bounds());
         let description = self.camera.apply(CameraDescription::framing(bounds))?;

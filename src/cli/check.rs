@@ -169,7 +169,7 @@ impl DescribedMesh {
             quads: self.quads,
             largest_face: self.largest_face,
             patches: mesh.n_leaves(),
-            closed: incidence.n_open() == 0,
+            closed: mesh.n_leaves() > 0 && incidence.n_open() == 0,
             shared_edges: incidence.n_edges(),
             boundary_edges: incidence.n_open(),
             nonmanifold_edges: counts.nonmanifold_edges,
@@ -196,6 +196,7 @@ impl Report {
         s.examples.iter().try_for_each(|example| writeln!(out, "  {example}"))?;
         let r = &self.rays;
         writeln!(out, "rays: {} at {} targets, {} leaks, {} hit nothing", r.rays, r.targets, r.leaks, r.hit_nothing)?;
+        writeln!(out, "not aimed: {} rays, at targets seen edge-on or too small for single precision", r.unfit)?;
         for leak in &r.examples {
             let [x, y, z] = leak.origin;
             let [dx, dy, dz] = leak.direction;
@@ -209,6 +210,10 @@ impl Report {
         if leaks + different > 0 {
             let message = format!("{leaks} rays passed and {different} border points differ: please report the mesh");
             return Err(Error::new(ErrorKind::Check, message));
+        }
+        if self.complete && self.rays.rays == 0 && self.rays.unfit > 0 {
+            let message = "no ray could be aimed: the mesh is too flat, or too far away for its size";
+            return Err(Error::new(ErrorKind::Check, message.to_owned()));
         }
         if !self.complete {
             let message = format!("interrupted after {} rays without a leak", self.rays.rays);

@@ -1,6 +1,6 @@
 //! `lazytess compare`: how far one picture is from another.
 
-use super::outputs::check_outputs;
+use super::outputs::{check_extension, check_outputs};
 use super::stdout::print;
 use super::values::display_units;
 use crate::error::{Error, ErrorKind, Result};
@@ -35,7 +35,8 @@ pub struct CompareArgs {
 impl CompareArgs {
     /// Compares, prints, and judges if asked to.
     pub fn run(&self) -> Result<()> {
-        check_outputs(&[self.diff.as_deref()], &[&self.a, &self.b])?;
+        self.diff.as_deref().map_or(Ok(()), |diff| check_extension(diff, "png", "a heat map"))?;
+        check_outputs(self.diff.as_deref(), [self.a.as_path(), self.b.as_path()])?;
         let (a, b) = (read_rgb(&self.a)?, read_rgb(&self.b)?);
         let (comparison, map) = compare(borrow(&a)?, borrow(&b)?)?;
         let json = serde_json::to_string_pretty(&comparison).expect("plain numbers have a JSON form");

@@ -1,7 +1,7 @@
 //! `lazytess generate`: control meshes of this program's making, as OBJ.
 
 use super::interrupt::{cancel_on_interrupt, unless_interrupted};
-use super::outputs::check_outputs;
+use super::outputs::{check_extension, check_outputs};
 use super::progress::Progress;
 use super::values::decimal_count;
 use crate::error::{Error, Result};
@@ -62,7 +62,8 @@ enum Job {
 impl GenerateArgs {
     /// Writes the mesh.
     pub fn run(&self) -> Result<()> {
-        check_outputs(&[Some(&self.output)], &[])?;
+        check_extension(&self.output, "obj", "a mesh")?;
+        check_outputs([self.output.as_path()], [])?;
         let job = self.job()?;
         let comment = format!("made by: lazytess generate {}", self.arguments());
         let progress = Progress::new("faces", self.quiet || matches!(job, Job::Mesh(_)));

@@ -51,6 +51,11 @@ fn load_mesh(path: &Path, options: &ReadOptions<'_>) -> Result<ControlMesh> {
     Ok(obj.mesh)
 }
 
+/// The files that a scene or a bare mesh is read from.
+pub fn files_of<'a>(path: &'a Path, scene: &'a SceneDescription) -> impl Iterator<Item = &'a Path> {
+    std::iter::once(path).chain(scene.meshes.iter().map(|mesh| mesh.file.as_path()))
+}
+
 /// Gives every mesh its rate: what was typed, else its own, else the scene's, else `px:1`.
 pub fn settle_rates(scene: &mut SceneDescription, typed: Option<Rate>) {
     let default = scene.render.rate.unwrap_or(Rate::Pixels(1.0));

@@ -41,6 +41,12 @@ pub fn write_film(path: &Path, format: PictureFormat, film: &Film, size: [u32; 2
     }
 }
 
+/// The files that [`write_film`] writes.
+pub fn files(path: &Path, format: PictureFormat, aovs: &[Aov]) -> Vec<PathBuf> {
+    let drawn = aovs.iter().filter(|_| format == PictureFormat::Png);
+    std::iter::once(path.to_owned()).chain(drawn.map(|aov| beside(path, aov.channels().1[0]))).collect()
+}
+
 /// Whether an AOV has a picture of its own.
 pub fn is_drawn(aov: Aov) -> bool {
     matches!(aov, Aov::Group | Aov::Reason | Aov::Error)

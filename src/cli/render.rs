@@ -1,6 +1,6 @@
 //! `lazytess render`: a scene or mesh becomes a picture.
 
-use super::input::{EditArgs, load_scene, settle_rates};
+use super::input::{EditArgs, files_of, load_scene, settle_rates};
 use super::interrupt::cancel_on_interrupt;
 use super::job::{Prepared, RenderScene};
 use super::outputs::check_outputs;
@@ -111,8 +111,10 @@ impl RenderArgs {
         if let Some(twice) = (1..self.aov.len()).find(|&i| self.aov[..i].contains(&self.aov[i])) {
             return Err(Error::input(format!("--aov names {} twice", self.aov[twice])));
         }
-        check_outputs(&[Some(&self.output), self.stats.as_deref()], &[&self.input])?;
         let mut scene = load_scene(&self.input)?;
+        let pictures = output::files(&self.output, format, &self.aov);
+        let outputs = pictures.iter().map(PathBuf::as_path).chain(self.stats.as_deref());
+        check_outputs(outputs, files_of(&self.input, &scene))?;
         settle_rates(&mut scene, self.picture.rate);
         Ok(RenderJob {
             settings: self.picture.settings(&scene, self.aov)?,

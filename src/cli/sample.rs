@@ -35,13 +35,14 @@ impl SampleArgs {
         let mesh = self.edits.load_mesh(&self.mesh)?;
         let surface = Surface::new(&mesh, 1)?;
         for place in &places {
-            check_place(place, &mesh, &surface).map_err(|message| Error::input(message).at(&self.at, None))?;
+            check_place(place, &mesh, &surface)
+                .map_err(|message| Error::input(message).at(&self.at, Some(place.line)))?;
         }
         let mut dicer = Dicer::default();
         stdout::print(|out| {
             writeln!(out, "face,sub,u,v,px,py,pz,dux,duy,duz,dvx,dvy,dvz")?;
             places.iter().try_for_each(|place| {
-                let SamplePlace { face, sub, u, v } = *place;
+                let SamplePlace { face, sub, u, v, .. } = *place;
                 write!(out, "{face},{sub},{u},{v}")?;
                 let values = evaluate(&surface, &mut dicer, place);
                 values.into_iter().flat_map(|p| p.to_array()).try_for_each(|value| write!(out, ",{value:.16e}"))?;
@@ -52,7 +53,7 @@ impl SampleArgs {
 }
 
 fn check_place(place: &SamplePlace, mesh: &ControlMesh, surface: &Surface) -> Result<(), String> {
-    let SamplePlace { face, sub, u, v } = *place;
+    let SamplePlace { face, sub, u, v, .. } = *place;
     let Some(&n) = mesh.face_sizes.get(face.idx()) else {
         return Err(format!("face {face} does not exist: the mesh has {}, counted from 0", mesh.n_faces()));
     };

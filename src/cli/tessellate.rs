@@ -2,7 +2,7 @@
 
 use super::input::EditArgs;
 use super::interrupt::{cancel_on_interrupt, unless_interrupted};
-use super::outputs::check_outputs;
+use super::outputs::{check_extension, check_outputs};
 use super::run_options::RunArgs;
 use super::values::fixed_rate;
 use crate::error::Result;
@@ -40,7 +40,8 @@ pub struct TessellateArgs {
 impl TessellateArgs {
     /// Writes the file.
     pub fn run(&self) -> Result<()> {
-        check_outputs(&[Some(&self.output)], &[&self.mesh])?;
+        check_extension(&self.output, "obj", "a mesh")?;
+        check_outputs([self.output.as_path()], [self.mesh.as_path()])?;
         let cancel = cancel_on_interrupt()?;
         let go_on = || match cancel.load(Ordering::Relaxed) {
             true => Err(io::Error::from(io::ErrorKind::Interrupted)),

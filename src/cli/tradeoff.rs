@@ -1,6 +1,6 @@
 //! `lazytess tradeoff`: what accuracy costs.
 
-use super::input::{EditArgs, load_scene, settle_rates};
+use super::input::{EditArgs, files_of, load_scene, settle_rates};
 use super::interrupt::cancel_on_interrupt;
 use super::job::{Prepared, RenderScene};
 use super::outputs::check_outputs;
@@ -75,9 +75,9 @@ pub struct TradeoffArgs {
 impl TradeoffArgs {
     /// Measures and prints.
     pub fn run(&self) -> Result<()> {
-        check_outputs(&[self.json.as_deref(), self.svg.as_deref()], &[&self.input])?;
         let cancel = cancel_on_interrupt()?;
         let mut scene = load_scene(&self.input)?;
+        check_outputs(self.json.as_deref().into_iter().chain(self.svg.as_deref()), files_of(&self.input, &scene))?;
         let settings = self.settings(&scene)?;
         if self.thesis {
             return print_tables(self, &mut scene, &settings, &cancel);

@@ -1,6 +1,6 @@
 //! `lazytess tune`: how large the cache should be.
 
-use super::input::{load_scene, settle_rates};
+use super::input::{files_of, load_scene, settle_rates};
 use super::interrupt::cancel_on_interrupt;
 use super::outputs::check_outputs;
 use super::picture::PictureArgs;
@@ -13,6 +13,7 @@ use crate::io::process::Stopwatch;
 use crate::io::write::write_whole;
 use crate::report::plot::tuning_svg;
 use crate::report::{RecordedRender, Tuning};
+use crate::scene::description::SceneDescription;
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
@@ -49,8 +50,9 @@ pub struct TuneArgs {
 impl TuneArgs {
     /// Renders, replays and tells.
     pub fn run(self) -> Result<()> {
-        check_outputs(&[self.svg.as_deref()], &[&self.input])?;
-        let tuning = self.tuning()?;
+        let scene = load_scene(&self.input)?;
+        check_outputs(self.svg.as_deref(), files_of(&self.input, &scene))?;
+        let tuning = self.tuning(scene)?;
         if let Some(path) = &self.svg {
             let svg = tuning_svg(&tuning).map_err(|e| Error::input(format!("the plot cannot be drawn: {e}")))?;
             write_whole(path, |out| out.write_all(svg.as_bytes()))?;
@@ -64,8 +66,7 @@ impl TuneArgs {
         })
     }
 
-    fn tuning(&self) -> Result<Tuning> {
-        let mut scene = load_scene(&self.input)?;
+    fn tuning(&self, mut scene: SceneDescription) -> Result<Tuning> {
         settle_rates(&mut scene, self.picture.rate);
         let settings = self.picture.settings(&scene, Vec::new())?;
         let cancel = cancel_on_interrupt()?;

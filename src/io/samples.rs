@@ -9,9 +9,14 @@ use std::path::Path;
 /// Longest line in bytes, and one more: without a bound a device file would fill the memory.
 const MAX_LINE: u64 = 1 << 16;
 
+/// What some programs begin a text in UTF-8 with.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// A place on a mesh's limit surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SamplePlace {
+    /// The line it comes from, counted from 1.
+    pub line: usize,
     /// The face, in file order.
     pub face: FaceId,
     /// Which of its quads: 0 for a quad, the corner's number for other faces.
@@ -37,23 +42,24 @@ fn parse_sample_places(mut reader: impl BufRead, path: &Path) -> Result<Vec<Samp
         if n_read == 0 {
             break;
         }
-        let place = parse_line(&line, places.is_empty());
+        let text = if number == 1 { line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&line) } else { &line };
+        let place = parse_line(text, number, places.is_empty());
         places.extend(place.map_err(|message| Error::input(message).at(path, Some(number)))?);
     }
     Ok(places)
 }
 
 /// The place of a line, if it is not one to be passed over.
-fn parse_line(line: &[u8], may_be_header: bool) -> Result<Option<SamplePlace>, String> {
+fn parse_line(line: &[u8], number: usize, may_be_header: bool) -> Result<Option<SamplePlace>, String> {
     if line.len() as u64 == MAX_LINE {
         return Err(format!("a line of {MAX_LINE} bytes and more; is this a table of face,sub,u,v?"));
     }
     let row = std::str::from_utf8(line).map_err(|_| "this is no text in UTF-8".to_owned())?.trim();
     let is_header = may_be_header && row.starts_with("face,sub,u,v");
-    if row.is_empty() || row.starts_with('#') || is_header { Ok(None) } else { parse_row(row).map(Some) }
+    if row.is_empty() || row.starts_with('#') || is_header { Ok(None) } else { parse_row(row, number).map(Some) }
 }
 
-fn parse_row(row: &str) -> Result<SamplePlace, String> {
+fn parse_row(row: &str, line: usize) -> Result<SamplePlace, String> {
     let mut columns = row.split(',').map(str::trim);
     let mut column = |name: &str| columns.next().ok_or_else(|| format!("column {name} of face,sub,u,v is missing"));
     let id = |text: &str| text.parse::<u32>().map_err(|_| format!("'{text}' is no number of a face or quad"));
@@ -62,6 +68,7 @@ fn parse_row(row: &str) -> Result<SamplePlace, String> {
         value.ok_or_else(|| format!("parameter '{text}' should lie within 0..1"))
     };
     Ok(SamplePlace {
+        line,
         face: FaceId(id(column("face")?)?),
         sub: id(column("sub")?)?,
         u: parameter(column("u")?)?,
@@ -79,9 +86,9 @@ mod tests {
 
     #[test]
     fn comments_header_and_further_columns_are_passed_over() {
-        let places = parse("# limit points\nface,sub,u,v,px\n0,0,0.25,1,7\r\n\n 3, 2, 0, 0.5\n").unwrap();
-        let place = |face, sub, u, v| SamplePlace { face: FaceId(face), sub, u, v };
-        assert_eq!(places, [place(0, 0, 0.25, 1.0), place(3, 2, 0.0, 0.5)]);
+        let places = parse("\u{feff}# limit points\nface,sub,u,v,px\n0,0,0.25,1,7\r\n\n 3, 2, 0, 0.5\n").unwrap();
+        let place = |line, face, sub, u, v| SamplePlace { line, face: FaceId(face), sub, u, v };
+        assert_eq!(places, [place(3, 0, 0, 0.25, 1.0), place(5, 3, 2, 0.0, 0.5)]);
     }
 
     #[test]

@@ -1,7 +1,8 @@
 //! Whole files or none.
 //!
 //! [`write_whole`] writes to a temporary name in the same folder and renames: a reader never sees half a file, and an
-//! interrupted or failed write leaves what was there before.
+//! interrupted or failed write leaves what was there before. [`check_writable`] tells before hours of work whether that
+//! will be possible.
 
 use crate::error::{Error, Result};
 use std::fs::{self, File};
@@ -13,12 +14,49 @@ use std::path::{Path, PathBuf};
 /// A device or pipe (`/dev/stdout`) cannot be renamed over and is written to directly.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
     let failed = |e| Error::io("write", path, e);
-    // A symbolic link stays one: what it points to is replaced.
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = target_of(path);
     match fs::metadata(&target) {
-        Ok(there) if there.is_dir() => Err(Error::input("is a folder: name a file to write to").at(path, None)),
+        Ok(there) if there.is_dir() => Err(a_folder(path)),
         Ok(there) if !there.is_file() => write_direct(&target, fill).map_err(failed),
         _ => write_and_rename(&target, fill).map_err(failed),
+    }
+}
+
+/// Refuses what [`write_whole`] would refuse now: a folder, a name in a folder that does not exist or that nobody may
+/// write to. Nothing is left behind.
+pub fn check_writable(path: &Path) -> Result<()> {
+    let target = target_of(path);
+    match fs::metadata(&target) {
+        Ok(there) if there.is_dir() => return Err(a_folder(path)),
+        Ok(there) if !there.is_file() => return Ok(()),
+        _ => (),
+    }
+    let folder = folder_of(&target);
+    if !folder.is_dir() {
+        return Err(Error::input(format!("there is no folder {} to write to", folder.display())).at(path, None));
+    }
+    temporary_beside(&target).map(drop).map_err(|e| Error::io("write", path, e))
+}
+
+fn a_folder(path: &Path) -> Error {
+    Error::input("is a folder: name a file to write to").at(path, None)
+}
+
+/// Links that are followed to a file that does not exist yet, at most.
+const MOST_LINKS: usize = 40;
+
+/// The file that a path means, by one spelling for all: a symbolic link stays one, what it points to is meant, even if
+/// that does not exist yet.
+pub fn target_of(path: &Path) -> PathBuf {
+    let mut target = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        let Ok(link) = fs::read_link(&target) else { break };
+        target = folder_of(&target).join(link);
+    }
+    match (fs::canonicalize(&target), fs::canonicalize(folder_of(&target)), target.file_name()) {
+        (Ok(there), ..) => there,
+        (_, Ok(folder), Some(name)) => folder.join(name),
+        _ => target,
     }
 }
 
@@ -81,6 +119,21 @@ mod tests {
         assert!(taken.to_string().contains("is a folder"), "{taken}");
     }
 
+    #[test]
+    fn what_can_be_written_is_told_beforehand() {
+        let folder = tempfile::tempdir().unwrap();
+        let refusal = |name: &str| check_writable(&folder.path().join(name)).map_err(|e| e.to_string());
+        assert_eq!(refusal("out.txt"), Ok(()));
+        assert!(refusal("no/out.txt").unwrap_err().contains("there is no folder "));
+        assert!(refusal("").unwrap_err().ends_with("is a folder: name a file to write to"));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        if cfg!(target_os = "linux") {
+            let message = check_writable(Path::new("/proc/out.txt")).unwrap_err().to_string();
+            assert!(message.starts_with("cannot write /proc/out.txt"), "{message}");
+            assert!(check_writable(Path::new("/dev/null")).is_ok());
+        }
+    }
+
     #[cfg(unix)]
     #[test]
     fn link_and_device_stay_what_they_are() {
@@ -92,6 +145,11 @@ mod tests {
         write_whole(&link, |out| out.write_all(b"new")).unwrap();
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(fs::read(&real).unwrap(), b"new");
+        fs::remove_file(&real).unwrap();
+        assert_eq!(target_of(&link), target_of(&real));
+        write_whole(&link, |out| out.write_all(b"anew")).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&real).unwrap(), b"anew");
         write_whole(Path::new("/dev/null"), |out| out.write_all(b"gone")).unwrap();
         assert!(fs::metadata("/dev/null").unwrap().file_type().is_char_device());
     }

@@ -93,14 +93,15 @@ const LEAST_SIZE: usize = 64 << 10;
 #[derive(Clone, Copy)]
 struct TimeModel {
     recorded_seconds: f64,
-    recorded_hit_rate: f64,
+    /// The share of lookups for which nothing was built, what a thread remembered of its own blocks included.
+    recorded_without_building: f64,
     /// Wall seconds if every lookup missed.
     all_misses_seconds: f64,
 }
 
 impl TimeModel {
     fn seconds(&self, hit_rate: f64) -> f64 {
-        self.recorded_seconds + (self.recorded_hit_rate - hit_rate) * self.all_misses_seconds
+        self.recorded_seconds + (self.recorded_without_building - hit_rate) * self.all_misses_seconds
     }
 }
 
@@ -115,7 +116,7 @@ impl Tuning {
         let build_seconds = counters.build_time.as_secs_f64() / counters.misses().max(1) as f64;
         let time = TimeModel {
             recorded_seconds: render.seconds,
-            recorded_hit_rate: counters.hit_rate(),
+            recorded_without_building: 1.0 - counters.misses() as f64 / counters.lookups.max(1) as f64,
             all_misses_seconds: build_seconds * counters.lookups as f64 / render.threads as f64,
         };
         let working_set = replay.working_set_bytes();

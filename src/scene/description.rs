@@ -191,6 +191,9 @@ impl CameraDescription {
         let Some(forward) = (at - eye).try_normalize() else {
             return Err("the camera's eye and at are the same point: move one".to_owned());
         };
+        if up == DVec3::ZERO {
+            return Err("the camera's up direction is zero: choose another".to_owned());
+        }
         let sideways = up.try_normalize().map_or(0.0, |up| forward.cross(up).length());
         if sideways < 1e-9 {
             return Err("the camera looks along its up direction: choose another up".to_owned());

@@ -67,7 +67,7 @@ pub struct WorldMesh {
     visible: Option<Vec<PatchId>>,
     world_from_object: DAffine3,
     lattice_from_world: DAffine3,
-    /// Takes normals of object space to world space, whatever the transform mirrors.
+    /// Takes normals of object space to world space: what was outside stays outside, whatever the transform mirrors.
     world_from_object_normal: DMat3,
     rate: DicingRate,
     bounds_in_world: DBounds,
@@ -234,7 +234,7 @@ impl WorldMesh {
             visible,
             world_from_object,
             lattice_from_world,
-            world_from_object_normal: linear.inverse().transpose() * linear.determinant().signum(),
+            world_from_object_normal: linear.inverse().transpose(),
             rate,
             bounds_in_world,
             entrance: Entrance::new(&lattice_from_world, reach),
@@ -286,7 +286,8 @@ impl WorldMesh {
         &self.lattice_from_world
     }
 
-    /// Takes normals of object space to world space, mirrored transforms included; lengths are not kept.
+    /// Takes normals of object space to world space, mirrored transforms included, which leave outside what is outside;
+    /// lengths are not kept.
     pub fn world_from_object_normal(&self) -> &DMat3 {
         &self.world_from_object_normal
     }

@@ -128,7 +128,10 @@ fn read_paths(ints: &[u32], shortest: usize) -> Result<Vec<&[u32]>, String> {
         let length = *length as usize;
         if length < shortest || length > tail.len() {
             let n = tail.len();
-            return Err(format!("path length {length} should be in {shortest}..={n}: {n} numbers follow it"));
+            return Err(match n < shortest {
+                true => format!("a path of {shortest} numbers and more should follow its length; {n} are left"),
+                false => format!("path length {length} should be in {shortest}..={n}: {n} numbers follow it"),
+            });
         }
         let (path, after) = tail.split_at(length);
         paths.push(path);

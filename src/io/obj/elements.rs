@@ -102,8 +102,13 @@ impl MeshBuilder {
         if n < 3 {
             return Err(format!("a face needs at least 3 corners and this one has {n}: delete it or add corners"));
         }
-        let n = u32::try_from(n).map_err(|_| "the face has more than 2^32 corners".to_owned())?;
-        self.mesh.face_sizes.push(n);
+        if n > ControlMesh::MOST_CORNERS as usize {
+            return Err(format!(
+                "a face has at most {} corners and this one has {n}: divide it",
+                ControlMesh::MOST_CORNERS
+            ));
+        }
+        self.mesh.face_sizes.push(n as u32);
         Ok(())
     }
 
@@ -208,9 +213,12 @@ pub fn integer(word: &[u8]) -> Result<i64, String> {
         [b'+', digits @ ..] => (false, digits),
         digits => (false, digits),
     };
-    // Eighteen digits cannot overflow.
-    if digits.is_empty() || digits.len() > 18 || !digits.iter().all(u8::is_ascii_digit) {
+    if digits.is_empty() || !digits.iter().all(u8::is_ascii_digit) {
         return Err(format!("{} is no index: write a whole number", show(word)));
+    }
+    // Eighteen digits cannot overflow.
+    if digits.len() > 18 {
+        return Err(format!("{} does not exist: a mesh has at most 2^31 vertices", show(word)));
     }
     let value = digits.iter().fold(0i64, |value, digit| value * 10 + i64::from(digit - b'0'));
     Ok(if negative { -value } else { value })

@@ -129,7 +129,7 @@ fn every_mistake_gets_a_sentence_with_its_line() {
         ("f 0 1 2\n", "m.obj:1: vertex 0 does not exist: OBJ counts from 1"),
         ("v 0 0 0\nf 1 1 -2\n", "m.obj:2: vertex '-2' does not exist: 1 are defined before this line"),
         ("f 1 2 3000000000\n", "m.obj:1: vertex '3000000000' does not exist: a mesh has at most 2^31"),
-        ("f 1 2 99999999999999999999\n", "m.obj:1: '99999999999999999999' is no index"),
+        ("f 1 2 99999999999999999999\n", "m.obj:1: '99999999999999999999' does not exist"),
         ("", "m.obj: the mesh has no faces ('f' lines); is this an OBJ file?"),
     ];
     for (text, expected) in cases {

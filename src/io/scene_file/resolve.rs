@@ -1,6 +1,8 @@
 //! From tables to a scene description: paths, transforms, materials by name.
 
-use super::tables::{CameraTable, LightTable, MaterialTable, MeshTable, RenderTable, SceneTables, TransformTable};
+use super::tables::{
+    CameraTable, GlassTable, LightTable, MaterialTable, MeshTable, RenderTable, SceneTables, TransformTable,
+};
 use super::values::{Colour, Number, Share};
 use crate::scene::description::{
     Albedo, CameraDescription, Glass, Light, Material, MeshDescription, RenderDefaults, SceneDescription,
@@ -82,6 +84,7 @@ fn material(name: String, table: MaterialTable) -> Result<Material> {
     let or_zero = |share: Option<Share>| share.map_or(Vec3::ZERO, |share| share.0);
     // A mirror or glass without a stated body colour has none; anything else is the neutral grey.
     let clear = table.mirror.is_some() || table.glass.is_some();
+    let has_body = table.diffuse.is_some() || table.checker.is_some() || table.mirror.is_some();
     let diffuse = match (table.diffuse, table.checker) {
         (Some(_), Some(checker)) => return Err(mistake(&checker, "a material has diffuse or checker, not both")),
         (Some(diffuse), None) => Albedo::Constant(diffuse.0),
@@ -92,18 +95,24 @@ fn material(name: String, table: MaterialTable) -> Result<Material> {
         (None, None) if clear => Albedo::Constant(Vec3::ZERO),
         (None, None) => neutral.diffuse,
     };
-    let glass = |ior: f64, transmit: Option<Share>| Glass {
-        ior: ior as f32,
-        transmit: transmit.map_or(Vec3::ONE, |share| share.0),
-    };
+    let glass = table.glass.map(|table| glass(table, has_body)).transpose()?;
     Ok(Material {
         name,
         diffuse,
         specular: or_zero(table.specular),
         shininess: table.shininess.map_or(neutral.shininess, |shininess| shininess.0 as f32),
         mirror: or_zero(table.mirror),
-        glass: table.glass.map(|table| glass(table.ior.0, table.transmit)),
+        glass,
     })
+}
+
+/// `has_body`: whether the material gives back light by itself.
+fn glass(table: Spanned<GlassTable>, has_body: bool) -> Result<Glass> {
+    if has_body {
+        return Err(mistake(&table, "glass has neither diffuse nor checker nor mirror: leave out one or the other"));
+    }
+    let GlassTable { ior, transmit } = table.into_inner();
+    Ok(Glass { ior: ior.0 as f32, transmit: transmit.map_or(Vec3::ONE, |share| share.0) })
 }
 
 fn mesh(table: MeshTable, folder: &Path, materials: &BTreeMap<String, Material>) -> Result<MeshDescription> {

@@ -51,7 +51,7 @@ pub struct MaterialTable {
     pub specular: Option<Share>,
     pub shininess: Option<Positive>,
     pub mirror: Option<Share>,
-    pub glass: Option<GlassTable>,
+    pub glass: Option<Spanned<GlassTable>>,
 }
 
 #[derive(Deserialize)]

@@ -133,6 +133,12 @@ fn every_mistake_gets_a_sentence_with_its_line() {
         ("[materials.a]\ndiffuse = 1.5\n", ":2: a surface cannot give back more light"),
         ("[materials.a]\nshininess = 0\n", ":2: 0 should be above 0"),
         ("[materials.a]\nglass = { ior = 0 }\n", ":2: 0 should be above 0"),
+        (
+            "[materials.a]\ndiffuse = 0.5\nglass = { ior = 1.5 }\n",
+            ":3: glass has neither diffuse nor checker nor mirror",
+        ),
+        ("[materials.a]\nshininess = 1e300\n", ":2: 1e300 is no number that can be used"),
+        ("background = 1e38\n", ":1: 1e38 is no number that can be used"),
         ("[[mesh]]\nfile = 3\n", ":2: invalid type: integer `3`, expected a string"),
         ("[[mesh]]\nfile = \"\"\n", ":2: the mesh needs the name of a file"),
         ("[[mesh]]\nfile = \"a.obj\"\nfils = 1\n", ":3: unknown field `fils`"),

@@ -14,12 +14,15 @@ pub struct Number(pub f64);
 
 impl<'de> Deserialize<'de> for Number {
     fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        let value = f64::deserialize(d)?;
-        if value.abs() <= MAX_NUMBER {
-            return Ok(Self(value));
-        }
-        Err(D::Error::custom(format!("{value} is no number that can be used: write one within ±{MAX_NUMBER:e}")))
+        usable(f64::deserialize(d)?).map(Self)
     }
+}
+
+fn usable<E: Error>(value: f64) -> Result<f64, E> {
+    if value.abs() <= MAX_NUMBER {
+        return Ok(value);
+    }
+    Err(E::custom(format!("{value:e} is no number that can be used: write one within ±{MAX_NUMBER:e}")))
 }
 
 /// A number above 0.
@@ -92,7 +95,7 @@ impl<'de> Visitor<'de> for ColourVisitor {
     }
 
     fn visit_f64<E: Error>(self, grey: f64) -> Result<Vec3, E> {
-        if grey.abs() <= MAX_NUMBER { Ok(Vec3::splat(grey as f32)) } else { Err(E::custom("a colour must be finite")) }
+        usable(grey).map(|grey| Vec3::splat(grey as f32))
     }
 
     fn visit_i64<E: Error>(self, grey: i64) -> Result<Vec3, E> {
@@ -139,7 +142,7 @@ impl<'de> Visitor<'de> for ScaleVisitor {
     }
 
     fn visit_f64<E: Error>(self, all: f64) -> Result<DVec3, E> {
-        if all.abs() <= MAX_NUMBER { Ok(DVec3::splat(all)) } else { Err(E::custom("a scale must be finite")) }
+        usable(all).map(DVec3::splat)
     }
 
     fn visit_i64<E: Error>(self, all: i64) -> Result<DVec3, E> {
