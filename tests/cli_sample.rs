@@ -40,9 +40,9 @@ fn mistakes_are_sentences_with_exit_code_two() {
         sample(mesh, places).code(2).stdout("").stderr(predicate::str::contains(expected));
     };
     fails(QUAD, "0,0,2,0\n", "lazytess: s.csv:1: parameter '2' should lie within 0..1");
-    fails(QUAD, "1,0,0,0\n", "lazytess: s.csv: face 1 does not exist: the mesh has 1");
-    fails(QUAD, "0,1,0,0\n", "lazytess: s.csv: face 0 has 1 quads, counted from 0; 1 does not exist");
-    fails(&format!("{QUAD}t hole 1/0/0 0\n"), "0,0,0,0\n", "lazytess: s.csv: face 0 has no surface");
+    fails(QUAD, "1,0,0,0\n", "lazytess: s.csv:1: face 1 does not exist: the mesh has 1");
+    fails(QUAD, "0,1,0,0\n", "lazytess: s.csv:1: face 0 has 1 quads, counted from 0; 1 does not exist");
+    fails(&format!("{QUAD}t hole 1/0/0 0\n"), "0,0,0,0\n", "lazytess: s.csv:1: face 0 has no surface");
     fails("v 0 0\n", "0,0,0,0\n", "lazytess: m.obj:1: a vertex needs x, y and z; z is missing");
 }
 

@@ -93,6 +93,34 @@ fn off_the_edges([a, b, c]: [DVec3; 3], [second, third]: [f32; 2], distance: f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cache::CacheConfig;
+    use crate::math::Intersect;
+    use crate::scene::rate::DicingRate;
+    use crate::scene::world::{GridCache, World};
+    use glam::DAffine3;
+
+    /// Faces that are counter-clockwise seen from outside are so in a mirror, too.
+    #[test]
+    fn normals_of_mirrored_meshes_point_outwards() {
+        let shapes = crate::mesh::shapes::all();
+        let (_, cube) = &shapes.iter().find(|(name, _)| *name == "cube").expect("a cube");
+        for scale in [[2.0, 1.0, 1.0], [-2.0, 1.0, 1.0], [-1.0, -1.0, 3.0], [-1.0, -1.0, -1.0]] {
+            let place = DAffine3::from_scale(DVec3::from_array(scale));
+            let world = World::new(vec![WorldMesh::new(cube.clone(), place, DicingRate::Fixed(4), 1).unwrap()]);
+            let cache = GridCache::new(&world, CacheConfig::with_bytes(1 << 20)).unwrap();
+            let mut tracer = Intersector::new(&world, &cache);
+            let center = world.meshes()[0].bounds_in_world().center();
+            for toward in [DVec3::new(0.3, 0.2, 1.0), DVec3::new(-1.0, 0.1, 0.2), DVec3::new(0.1, -0.8, 0.3)] {
+                let ray = Ray::new(center - 50.0 * toward, toward);
+                let hit = tracer.closest(&ray).expect("a hit");
+                let point = tracer.surface_point(&ray, &hit);
+                assert!(
+                    point.geometric_normal.dot(toward) < 0.0 && point.shading_normal.dot(toward) < 0.0,
+                    "{scale:?}"
+                );
+            }
+        }
+    }
 
     const TRIANGLE: [DVec3; 3] = [DVec3::ZERO, DVec3::new(4.0, 0.0, 0.0), DVec3::new(0.0, 3.0, 0.0)];
 

@@ -8,6 +8,8 @@ pub(super) struct Numbering {
     /// Stamps and numbers, at the hash of the value or in the next free place; twice as many as there are values, or
     /// more.
     table: Vec<[u32; 2]>,
+    /// What is left of the 32 bits of a product is a place in the table.
+    shift: u32,
     stamp: u32,
 }
 
@@ -26,6 +28,7 @@ impl Numbering {
     fn make_table(&mut self, len: usize) {
         self.table.clear();
         self.table.resize(len, [0; 2]);
+        self.shift = u32::BITS - len.ilog2();
         self.stamp = 1;
         for number in 0..self.values.len() {
             let place = self.place(self.values[number]);
@@ -37,7 +40,8 @@ impl Numbering {
     #[inline(always)]
     fn place(&self, value: u32) -> usize {
         let mask = self.table.len() - 1;
-        let mut place = (value.wrapping_mul(0x9e37_79b9) >> 16) as usize & mask;
+        // The upper bits of the product depend on all of the value (Knuth 1998, 6.4): as many as the table has places.
+        let mut place = (value.wrapping_mul(0x9e37_79b9) >> self.shift) as usize;
         loop {
             let [stamp, number] = self.table[place];
             if stamp != self.stamp || self.values[number as usize] == value {
@@ -68,5 +72,26 @@ impl Numbering {
             self.make_table(2 * self.table.len());
         }
         (number, true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_numbered_as_they_come_and_found_at_once() {
+        let mut numbering = Numbering::default();
+        for (n, step) in [(10, 1), (100_000, 1), (100_000, 4096), (10, 7)] {
+            numbering.clear();
+            for i in 0..n {
+                assert_eq!(numbering.number(i * step), (i, true));
+            }
+            assert!((0..n).all(|i| numbering.find(i * step) == Some(i)) && numbering.find(u32::MAX).is_none());
+            let home = |value: u32| (value.wrapping_mul(0x9e37_79b9) >> numbering.shift) as usize;
+            let way = |value: u32| numbering.place(value).wrapping_sub(home(value)) & (numbering.table.len() - 1);
+            let mean = (0..n).map(|i| way(i * step) as f64).sum::<f64>() / f64::from(n);
+            assert!(mean < 3.0, "{n} values, {step} apart: {mean} places are passed on the way to one");
+        }
     }
 }

@@ -133,10 +133,6 @@ fn every_mistake_gets_a_sentence_with_its_line() {
         ("[materials.a]\ndiffuse = 1.5\n", ":2: a surface cannot give back more light"),
         ("[materials.a]\nshininess = 0\n", ":2: 0 should be above 0"),
         ("[materials.a]\nglass = { ior = 0 }\n", ":2: 0 should be above 0"),
-        (
-            "[materials.a]\ndiffuse = 0.5\nglass = { ior = 1.5 }\n",
-            ":3: glass has neither diffuse nor checker nor mirror",
-        ),
         ("[materials.a]\nshininess = 1e300\n", ":2: 1e300 is no number that can be used"),
         ("background = 1e38\n", ":1: 1e38 is no number that can be used"),
         ("[[mesh]]\nfile = 3\n", ":2: invalid type: integer `3`, expected a string"),
@@ -153,6 +149,10 @@ fn every_mistake_gets_a_sentence_with_its_line() {
 fn every_mistake_in_a_scene_with_a_mesh_gets_a_sentence_with_its_line() {
     let cases = [
         ("material = \"wax\"", "3: material 'wax' is not defined; [materials] has none"),
+        (
+            "material = \"a\"\n[materials.a]\nmirror = 0.5\nglass = { ior = 1.5 }\n",
+            "6: glass has neither diffuse nor checker nor mirror",
+        ),
         ("material = \"wax\"\n[materials.wood]\n", "3: material 'wax' is not defined; [materials] has wood"),
         ("transform = { scale = 0 }", "3: the transform is singular"),
         ("transform = { scale = [1, 0, 1] }", "3: the transform is singular"),
