@@ -49,8 +49,8 @@
 //! publishes. So a builder that the system puts to sleep delays nobody, and since equal slots have equal bytes it does
 //! not matter whose block it is.
 //!
-//! **Recycling.** Who finds the current segment full makes the next one current, if every pin stands at `head + 1 - G`
-//! or later. Any number of threads may try at once. If a pin lags behind, or if the block is larger than a segment, the
+//! **Recycling.** Who finds the current segment full makes the next one current: as long as there are segments that
+//! were never used without more ado, later if every pin stands at `head + 1 - G` or later. Any number of threads may try at once. If a pin lags behind, or if the block is larger than a segment, the
 //! block is built in memory of the thread's own and seen by no other: a **bypass**. Blocks below it are bypassed, too.
 //! A thread remembers the last [`SegmentCache::SCRATCH_BYTES`] of such blocks: without any cache, the next ray often
 //! needs what the last ones have built.
@@ -67,21 +67,22 @@
 //!
 //! 1. *A block is written by one thread, before its word is published with `Release`; words are read with `Acquire`.*
 //!    Lines are reserved by an atomic addition to the cursor of the segment, so no two threads write the same line.
-//! 2. *While a pin stands at `p`, the head is at most `p + G`.* Follows from 4: to reach `p + G + 1` somebody must have
-//!    seen every pin at `p + 1` or later.
+//! 2. *While a pin stands at `p`, nothing is recycled to open an age beyond `p + G`.* Follows from 4: for `p + G + 1`
+//!    somebody must have seen every pin at `p + 1` or later. (Segments that were never used are opened beyond it.)
 //! 3. *While a pin stands at `p`, no segment of an age above `p + G - S` is recycled.* Recycling age `a` means opening
-//!    age `a + S`, and `a + S <= p + G` by 2. It holds for what the pin's thread reads and, since it reserves at an age
-//!    of at least `p` and `G < S`, for what it writes.
+//!    age `a + S`, and `a + S <= p + G` by 2. It holds for what the pin's thread reads, however far the head is, and,
+//!    since it reserves at an age of at least `p` and `G < S`, for what it writes.
 //! 4. *No announcement is missed.* A pin's thread sees the head at `p`, stores `p`, fences (`SeqCst`), and sees the
 //!    head still at `p`. A recycler opens `h + 1` only if all pins stand at `h + 1 - G` or later, its own among them,
 //!    which stands at some `c`. If `h >= p + G`, then `c > p`: the recycler saw the head at `c` before it fenced, the
 //!    other thread saw it at `p` after it fenced, so the other's fence was first, and the scan, which comes after the
 //!    recycler's fence, sees the other's pin word. If `h < p + G`, the recycler opens at most `p + G`, which the pin
-//!    allows anyway. (With `G = 0` the recycler's own pin would stop it.)
+//!    allows anyway. (With `G = 0` the recycler's own pin would stop it. Who opens a segment that was never used
+//!    recycles nothing.)
 //! 5. *What was read is read before it is overwritten.* A pin word is stored with `Release` and scanned with `Acquire`,
 //!    the head is advanced with `Release` after the scan, and who writes in a segment has loaded the head with
-//!    `Acquire`. Every thread that may advance the head has made its own scan, so it does not matter whose advance
-//!    succeeds.
+//!    `Acquire`. Every thread that may advance the head to a recycled segment has made its own scan, so it does not
+//!    matter whose advance succeeds.
 //! 6. *A cursor belongs to one age.* It carries the age of its segment and is moved on by compare-and-swap before the
 //!    head is, so that of several recyclers one resets it. By 3 no thread adds to a cursor of an age that is past.
 //! 7. *A slot is used with its own cache only*, which is checked when it is used. A child slot lives in its parent's

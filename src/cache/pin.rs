@@ -172,7 +172,8 @@ impl<'c> Pin<'c> {
     }
 
     /// Announces the head's age and makes sure that the announcement was in time (invariant 4). Each further round
-    /// means that the head has moved, and once a recycler has seen the pin the head can move only a few segments more.
+    /// means that the head has moved, which it does for as long as there are segments that were never used, and once a
+    /// recycler has seen the pin only a few segments more.
     #[cold]
     fn move_to_head(&mut self) {
         let ring = &self.cache.ring;

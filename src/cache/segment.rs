@@ -48,11 +48,16 @@ impl Ring {
         // Ages start at the number of segments so that `age - segments` never underflows, and stay in step with the
         // place in the ring.
         let first_age = first_age.max(segments as u64);
-        let cursors = (0..segments as u64).map(|i| AtomicU64::new(initial_cursor(i, segments as u64, first_age)));
+        // First, so that what is refused has cost nothing: of a huge ring the cursors alone would fill the memory.
+        let arena = Arena::new(segments * segment_lines)?;
+        let mut cursors = Vec::new();
+        cursors.try_reserve_exact(segments).ok()?;
+        let initial = |i: u64| AtomicU64::new(initial_cursor(i, segments as u64, first_age));
+        cursors.extend((0..segments as u64).map(initial));
         Some(Self {
             head: CachePadded::new(AtomicU64::new(first_age)),
-            cursors: cursors.collect(),
-            arena: Arena::new(segments * segment_lines)?,
+            cursors: cursors.into_boxed_slice(),
+            arena,
             segment_lines,
             segment_mask: segments - 1,
             grace: grace as u64,
@@ -96,7 +101,7 @@ impl Ring {
     }
 
     /// Reserves `lines` lines for the calling thread, which must be pinned: recycles the oldest segment if need be and
-    /// possible. At most `grace + 1` rounds, because the caller's own pin stops the head.
+    /// possible. As many rounds as there are segments at most, because then the caller's own pin stops the head.
     pub(super) fn reserve(&self, lines: usize, word_lines: usize, pins: &Pins) -> Result<Place, NoPlace> {
         if lines > self.segment_lines.min(MAX_BLOCK_LINES) {
             return Err(NoPlace::TooLarge);
@@ -139,8 +144,9 @@ impl Ring {
             return false;
         }
         // Invariant 4: the caller's own pin stands where it may if this passes, so that its fence is one for this scan,
-        // too.
-        if pins.any_before(self.oldest_allowing(next)) {
+        // too. A segment that was never used holds nothing that anybody could read.
+        let is_recycled = next >= self.first_age + self.n_segments();
+        if is_recycled && pins.any_before(self.oldest_allowing(next)) {
             return false;
         }
         // `Relaxed`: a cursor guards no memory but its own, and who sees the new head finds it reset by this thread or

@@ -252,6 +252,33 @@ fn unbounded_keeps_everything_and_peaks_at_what_was_filled() {
 }
 
 #[test]
+fn a_pin_that_stands_still_keeps_nobody_from_what_was_never_used() {
+    let cache = cache(16 * 256, 16);
+    let table = cache.table(1000);
+    let (mut sleeper, mut pin) = (cache.pin(), cache.pin());
+    let visit = sleeper.visit();
+    let read = fetch(&visit, visit.root(&table, SlotId(0)), 1, bytes(64));
+    for i in 1..64 {
+        let visit = pin.visit();
+        fetch(&visit, visit.root(&table, SlotId(i)), i as u8, bytes(64));
+    }
+    assert_eq!(pin.statistics().bypasses(), 0, "64 lines are all that there are");
+    for i in 64..200 {
+        let visit = pin.visit();
+        fetch(&visit, visit.root(&table, SlotId(i)), i as u8, bytes(64));
+    }
+    assert_eq!((pin.statistics().bypassed_pinned, read.bytes()), (136, &[1; 64][..]));
+    // It sees what others have built since it began, however far the head is by now.
+    assert_eq!(visit.get(visit.root(&table, SlotId(63))).map(|block| block.bytes()[0]), Some(63));
+    let visit = sleeper.visit();
+    fetch(&visit, visit.root(&table, SlotId(200)), 200, bytes(64));
+    drop(sleeper);
+    let visit = pin.visit();
+    fetch(&visit, visit.root(&table, SlotId(201)), 201, bytes(64));
+    assert_eq!(pin.statistics().bypassed_pinned, 136);
+}
+
+#[test]
 fn reinsertion_keeps_a_block_that_is_used_and_its_children() {
     let misses = [Reinsert::Never, Reinsert::Parents, Reinsert::All].map(|reinsert| {
         let cache = SegmentCache::new(CacheConfig { reinsert, ..config(16 * 256, 16) }).unwrap();

@@ -7,7 +7,7 @@ use super::run_options::RunArgs;
 use super::values::{count, fixed_rate, picture_size};
 use super::{PICTURE, stdout};
 use crate::bench::{Bench, BenchHit, BenchResult, BenchSettings, face_parameters};
-use crate::cache::{CacheConfig, CacheStatistics};
+use crate::cache::CacheStatistics;
 use crate::error::Result;
 use crate::ids::MeshId;
 use crate::io::process::{Stopwatch, peak_resident_bytes, resident_bytes};
@@ -141,8 +141,7 @@ impl BenchArgs {
         let world = World::new(vec![WorldMesh::new(mesh, DAffine3::IDENTITY, rate, threads)?]);
         let (build_s, build_cpu_s) = watch.seconds();
         let full = world.full_tessellation(threads);
-        let capacity = self.run.cache().capacity(full.most_bytes());
-        let cache = GridCache::new(&world, CacheConfig { capacity, ..CacheConfig::with_bytes(0) })?;
+        let cache = GridCache::new(&world, self.run.cache().config(full.most_bytes(), threads))?;
         let result = bench.run(|| Intersector::new(&world, &cache), |hit| bench_hit(&world, hit));
         let counters = cache.segments().statistics();
         let report = Report {

@@ -6,7 +6,6 @@ use super::progress::Progress;
 use super::run_options::RunArgs;
 use super::stdout;
 use super::values::{decimal_count, positive, vector};
-use crate::cache::CacheConfig;
 use crate::check::{Incidence, LeakReport, LeakSettings, SeamReport, compare_seams, find_leaks};
 use crate::error::{Error, ErrorKind, Result};
 use crate::ids::MeshId;
@@ -120,8 +119,8 @@ impl CheckArgs {
     }
 
     fn trace(&self, world: &World, incidence: &Incidence, threads: usize, cancel: &AtomicBool) -> Result<LeakReport> {
-        let capacity = self.run.cache().capacity(world.full_tessellation(threads).most_bytes());
-        let cache = GridCache::new(world, CacheConfig { capacity, ..CacheConfig::with_bytes(0) })?;
+        let most = world.full_tessellation(threads).most_bytes();
+        let cache = GridCache::new(world, self.run.cache().config(most, threads))?;
         let progress = Progress::new("rays", self.run.quiet);
         let settings = LeakSettings { rays: self.rays, seed: self.seed, threads };
         let report = |done: u64| progress.set(done as usize, self.rays as usize);

@@ -4,7 +4,6 @@ use super::camera::CameraArgs;
 use super::input::EditArgs;
 use super::progress::Progress;
 use super::values::CacheSize;
-use crate::cache::CacheConfig;
 use crate::error::{Error, ErrorKind, Result};
 use crate::io::obj::ReadOptions;
 use crate::io::process::{self, Stopwatch};
@@ -173,7 +172,7 @@ impl Prepared<'_> {
             CacheSize::Unbounded => self.world.full_tessellation(threads).most_bytes(),
             CacheSize::Bytes(_) => 0,
         };
-        GridCache::new(&self.world, CacheConfig { capacity: size.capacity(most), ..CacheConfig::with_bytes(0) })
+        GridCache::new(&self.world, size.config(most, threads))
     }
 
     /// Bytes of what is remembered of patches that rays leave.

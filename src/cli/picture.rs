@@ -4,7 +4,7 @@ use super::PICTURE;
 use super::camera::CameraArgs;
 use super::input::EditArgs;
 use super::job::RenderScene;
-use super::values::{count, crop, display_units, picture_size};
+use super::values::{crop, display_units, picture_size, samples};
 use crate::error::{Error, Result};
 use crate::render::{Aov, Groups, PixelRect, RenderSettings};
 use crate::scene::description::{IntegratorKind, Rate, SceneDescription};
@@ -17,7 +17,7 @@ pub struct PictureArgs {
     #[arg(long, value_name = "WxH", value_parser = picture_size, help_heading = PICTURE)]
     pub size: Option<[u32; 2]>,
     /// Samples per pixel [default: the scene's, or 4]
-    #[arg(long, value_name = "N", value_parser = count, help_heading = PICTURE)]
+    #[arg(long, value_name = "N", value_parser = samples, help_heading = PICTURE)]
     pub spp: Option<u32>,
     /// whitted, ao, path, or debug:normal|patch|uv|rate|depth|miss [default: the scene's, or whitted]
     #[arg(long, value_name = "NAME", help_heading = PICTURE)]
@@ -29,7 +29,7 @@ pub struct PictureArgs {
     #[arg(long, value_name = "N", help_heading = PICTURE)]
     pub max_depth: Option<u32>,
     /// Occlusion rays per sample of the ao integrator [default: the scene's, or 16]
-    #[arg(long, value_name = "N", value_parser = count, help_heading = PICTURE)]
+    #[arg(long, value_name = "N", value_parser = samples, help_heading = PICTURE)]
     pub ao_samples: Option<u32>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = PICTURE)]

@@ -5,7 +5,7 @@ use super::interrupt::{cancel_on_interrupt, unless_interrupted};
 use super::outputs::{check_extension, check_outputs};
 use super::run_options::RunArgs;
 use super::values::fixed_rate;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io::write::write_whole;
 use crate::scene::rate::DicingRate;
 use crate::scene::tessellate::tessellate;
@@ -50,6 +50,12 @@ impl TessellateArgs {
         let mesh = self.edits.load_mesh(&self.mesh)?;
         let rate = DicingRate::Fixed(self.rate);
         let mesh = WorldMesh::new(mesh, DAffine3::IDENTITY, rate, RunArgs::available_threads())?;
+        let n_triangles: u64 = mesh.surface().visible_patches().map(|p| mesh.patch_rates(p).n_triangles()).sum();
+        if n_triangles > u64::from(u32::MAX) {
+            return Err(Error::input(format!(
+                "{n_triangles} triangles are too many for a file: choose a lower --rate"
+            )));
+        }
         let written = write_whole(&self.output, |out| {
             let mut faces = Vec::new();
             let mut face = None;

@@ -9,7 +9,7 @@ use super::progress::Progress;
 use super::run_options::RunArgs;
 use super::stdout::print;
 use super::thesis_tables::print_tables;
-use super::values::{count, display_units, picture_size};
+use super::values::{display_units, picture_size, samples};
 use super::{PICTURE, camera::CameraArgs};
 use crate::error::{Error, ErrorKind, Result};
 use crate::image::difference::DifferenceMap;
@@ -47,7 +47,7 @@ pub struct TradeoffArgs {
     #[arg(long, value_name = "WxH", value_parser = picture_size, help_heading = PICTURE)]
     pub size: Option<[u32; 2]>,
     /// Samples per pixel [default: the scene's, or 4, as `render` takes; 1 with --thesis]
-    #[arg(long, value_name = "N", value_parser = count, help_heading = PICTURE)]
+    #[arg(long, value_name = "N", value_parser = samples, help_heading = PICTURE)]
     pub spp: Option<u32>,
     /// Integrator [default: the scene's, or whitted]
     #[arg(long, value_name = "NAME", help_heading = PICTURE)]

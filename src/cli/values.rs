@@ -1,6 +1,7 @@
 //! Values as they are typed: sizes, vectors, windows. Each parser's message says what to write.
 
-use crate::cache::Capacity;
+use crate::cache::{CacheConfig, Capacity};
+use crate::scene::description::MOST_SAMPLES;
 use glam::DVec3;
 use std::str::FromStr;
 
@@ -39,12 +40,14 @@ pub enum CacheSize {
 }
 
 impl CacheSize {
-    /// The cache's capacity, when all blocks that could be built take at most `all_blocks` bytes.
-    pub fn capacity(self, all_blocks: usize) -> Capacity {
-        match self {
+    /// What the cache is made of, when all blocks that could be built take at most `all_blocks` bytes and so many
+    /// threads work, each with a pin or two.
+    pub fn config(self, all_blocks: usize, threads: usize) -> CacheConfig {
+        let capacity = match self {
             Self::Bytes(bytes) => Capacity::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX)),
             Self::Unbounded => Capacity::Unbounded { at_most: all_blocks },
-        }
+        };
+        CacheConfig { capacity, max_threads: 2 * threads + 8, ..CacheConfig::with_bytes(0) }
     }
 }
 
@@ -101,6 +104,12 @@ pub fn threads(text: &str) -> Result<u32, String> {
 pub fn count(text: &str) -> Result<u32, String> {
     let number = text.parse().ok().filter(|&n| n > 0);
     number.ok_or_else(|| format!("'{text}' is no count: write a whole number from 1 to {}", u32::MAX))
+}
+
+/// A number of samples.
+pub fn samples(text: &str) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|n| (1..=MOST_SAMPLES).contains(n));
+    number.ok_or_else(|| format!("'{text}' is no number of samples: write a whole number from 1 to {MOST_SAMPLES}"))
 }
 
 /// Segments of an edge.

@@ -63,7 +63,9 @@ pub fn render<T: Tracer>(
             exposures.clear();
             exposures.resize(tile.n_pixels(), Exposure::default());
             shader.aim(camera, tile);
-            pixels.trace_tile(&mut shader, tile, &mut exposures);
+            if !pixels.trace_tile(&mut shader, tile, &mut exposures, run) {
+                break;
+            }
             records.clear();
             records.extend(exposures.iter().map(Exposure::record));
             film.lock().store(tile, &records);
@@ -78,6 +80,10 @@ pub fn render<T: Tracer>(
     pixels.add(Reason::Every, film.n_done() as u64);
     Rendered { complete: film.n_done() == settings.window.n_pixels(), film, rays, pixels, seconds: Default::default() }
 }
+
+/// With more samples a pixel than this a tile that was begun is given up when the render is cancelled; with fewer it is
+/// finished, which takes no time that anybody would notice.
+const SAMPLES_AT_ONCE: u32 = 64;
 
 /// Hands out tiles until there are no more, or the render is cancelled.
 pub(super) struct TileQueue<'a> {
@@ -180,16 +186,27 @@ impl PixelTracer<'_> {
         exposure.record()
     }
 
-    /// All samples of the pixels of a tile; `exposures` are as many, row by row.
-    fn trace_tile<T: Tracer>(&self, shader: &mut Shader<'_, T>, tile: PixelRect, exposures: &mut [Exposure]) {
+    /// All samples of the pixels of a tile; `exposures` are as many, row by row. Returns whether they are complete: a
+    /// tile of many samples takes long, and the render may be cancelled meanwhile.
+    fn trace_tile<T: Tracer>(
+        &self,
+        shader: &mut Shader<'_, T>,
+        tile: PixelRect,
+        exposures: &mut [Exposure],
+        run: &RunSettings<'_>,
+    ) -> bool {
+        let is_given_up = || self.settings.spp > SAMPLES_AT_ONCE && run.cancel.load(Ordering::Relaxed);
         if self.settings.shows_misses() {
             // One by one, so that it is known which pixel a block was built for.
             for (pixel, exposure) in tile.pixels().zip(exposures) {
                 self.expose(shader, pixel, exposure, self.settings.spp);
             }
-            return;
+            return true;
         }
         for block in tile.blocks(PACKET_SIZE) {
+            if is_given_up() {
+                return false;
+            }
             let _witness = PanicWitness(block);
             let mut pixels = block.pixels().cycle();
             let samples = (0..self.settings.spp).flat_map(|i| block.pixels().map(move |pixel| self.sample(pixel, i)));
@@ -198,6 +215,7 @@ impl PixelTracer<'_> {
                 exposures[idx].add(&sample);
             });
         }
+        true
     }
 
     /// Goes on with a pixel's samples until there are `n`.

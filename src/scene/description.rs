@@ -40,6 +40,9 @@ pub struct CameraDescription {
     pub fov: f64,
 }
 
+/// Samples of a pixel, and occlusion rays of a sample, at most: more would not be seen, and could hardly be waited for.
+pub const MOST_SAMPLES: u32 = 65536;
+
 /// `[render]`: what the scene's author suggests. `None` leaves it to the command line and its defaults.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderDefaults {

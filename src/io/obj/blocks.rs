@@ -6,11 +6,11 @@
 
 use super::elements::MeshBuilder;
 use super::lines::{LogicalLines, MAX_LINE, words};
-use super::{ObjMesh, PASSED_OVER, read_lines};
+use super::{ObjMesh, PASSED_OVER, parse_obj, read_lines};
 use crate::error::{Error, Result};
 use crossbeam::channel::{Receiver, Sender, bounded};
 use std::collections::VecDeque;
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 /// Bytes of a block, unless a line is longer.
@@ -30,15 +30,20 @@ type Parsed = (Block, Option<MeshBuilder>);
 pub(super) fn parse_blocks(reader: impl Read, path: &Path, n_threads: usize, block_bytes: usize) -> Result<ObjMesh> {
     let (jobs, queue) = bounded::<(Block, Sender<Parsed>)>(n_threads);
     std::thread::scope(|scope| {
-        for _ in 0..n_threads {
+        let spawn = |_| {
             let queue: Receiver<(Block, Sender<Parsed>)> = queue.clone();
-            scope.spawn(move || {
+            let work = move || {
                 for (block, done) in queue {
                     let part = parse_plain(&block);
                     // Nobody listens any more if an earlier block was wrong.
                     let _ = done.send((block, part));
                 }
-            });
+            };
+            std::thread::Builder::new().spawn_scoped(scope, work).is_ok()
+        };
+        // Where the system refuses a thread there are fewer.
+        if (0..n_threads).take_while(|i| spawn(*i)).count() == 0 {
+            return parse_obj(BufReader::new(reader), path);
         }
         let blocks = Blocks { reader, rest: Vec::new(), next_line: 1, block_bytes };
         let mesh = join(blocks, path, &jobs, n_threads);

@@ -5,7 +5,7 @@ use super::tables::{
 };
 use super::values::{Colour, Number, Share};
 use crate::scene::description::{
-    Albedo, CameraDescription, Glass, Light, Material, MeshDescription, RenderDefaults, SceneDescription,
+    Albedo, CameraDescription, Glass, Light, MOST_SAMPLES, Material, MeshDescription, RenderDefaults, SceneDescription,
 };
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
 use std::collections::BTreeMap;
@@ -65,8 +65,8 @@ fn render(table: RenderTable) -> Result<RenderDefaults> {
         return Err(mistake(size, "a picture's width and height should be in 1..65536"));
     }
     for count in [&table.spp, &table.ao_samples].into_iter().flatten() {
-        if *count.get_ref() == 0 {
-            return Err(mistake(count, "a number of samples should be at least 1"));
+        if !(1..=MOST_SAMPLES).contains(count.get_ref()) {
+            return Err(mistake(count, format!("a number of samples should be in 1..{MOST_SAMPLES}")));
         }
     }
     Ok(RenderDefaults {

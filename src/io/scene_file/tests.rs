@@ -171,7 +171,7 @@ fn every_mistake_in_a_scene_with_a_mesh_gets_a_sentence_with_its_line() {
         ("[camera]\neye = [0,1,0]\nat = [0,0,0]", "3: the camera looks along its up direction"),
         ("[camera]\neye = [0,0,1]\nat = [0,0,0]\nfov = 180", "3: the field of view is 180 degrees"),
         ("[render]\nsize = [0, 5]", "4: a picture's width and height should be in 1..65536"),
-        ("[render]\nao_samples = 0", "4: a number of samples should be at least 1"),
+        ("[render]\nao_samples = 0", "4: a number of samples should be in 1..65536"),
         (
             "[materials.a]\ndiffuse = 1\nchecker = { even = 0, odd = 1, size = 1 }",
             "5: a material has diffuse or checker",

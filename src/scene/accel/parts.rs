@@ -6,6 +6,7 @@
 //! need be, so that no arrangement of boxes takes more than a few passes.
 
 use crate::math::Bounds;
+use crate::parallel::for_each;
 use glam::Vec3;
 use parking_lot::Mutex;
 
@@ -42,12 +43,14 @@ pub(super) fn divide<'a>(boxes: &[Bounds], members: &'a mut [u32], n_threads: us
         parts.append(&mut divide(boxes, high, 1));
         return parts;
     }
-    let other = Mutex::new(Vec::new());
-    let mut parts = std::thread::scope(|scope| {
-        scope.spawn(|| *other.lock() = divide(boxes, high, n_threads / 2));
-        divide(boxes, low, n_threads - n_threads / 2)
+    let halves = [(low, n_threads - n_threads / 2), (high, n_threads / 2)];
+    let halves = halves.map(|(members, n_threads)| Mutex::new((members, n_threads, Vec::new())));
+    for_each(&halves, 2, |_, half| {
+        let (members, n_threads, parts) = &mut *half.lock();
+        *parts = divide(boxes, std::mem::take(members), *n_threads);
     });
-    parts.append(&mut other.into_inner());
+    let [mut parts, mut high] = halves.map(|half| half.into_inner().2);
+    parts.append(&mut high);
     parts
 }
 
