@@ -34,7 +34,8 @@ pub struct PictureArgs {
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = PICTURE)]
     pub seed: u32,
-    /// Render only columns x0 to x1 - 1 and rows y0 to y1 - 1, with the values they have in the whole picture
+    /// Render only columns x0 to x1 - 1 and rows y0 to y1 - 1, with the values they have in the whole picture. What
+    /// groups that they belong to need around them is traced, too: a small part is found faster with --groups off
     #[arg(long, value_name = "x0,x1,y0,y1", value_parser = crop, help_heading = PICTURE)]
     pub crop: Option<[u32; 4]>,
     /// Trace only the pixels that need it (adaptive), every pixel (off), or corners of patches (thesis, unchecked)

@@ -36,7 +36,7 @@ pub struct TuneArgs {
     /// Write the curve as a plot
     #[arg(long, value_name = "FILE.svg")]
     pub svg: Option<PathBuf>,
-    /// Accesses to keep, 8 bytes each; a render with more is sampled
+    /// Accesses to keep, 8 bytes each, a thousand at least; a render with more is sampled
     #[arg(long, value_name = "N", default_value = "4M", value_parser = decimal_count)]
     pub accesses: u64,
     /// The picture

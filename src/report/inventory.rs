@@ -136,7 +136,9 @@ fn valences(topology: &Topology) -> Vec<u32> {
     let mut valences = vec![0; topology.n_vertices()];
     for h in 0..topology.n_half_edges() as u32 {
         let twin = topology.twin(h);
-        if twin == NONE || h < twin {
+        // An edge of three faces and more has no twins, and one owner.
+        let is_counted_here = if twin == NONE { topology.edge_owner(h) == h } else { h < twin };
+        if is_counted_here {
             valences[topology.vertex(h) as usize] += 1;
             valences[topology.vertex(topology.next(h)) as usize] += 1;
         }
@@ -247,6 +249,16 @@ mod tests {
         let text = cube.to_string();
         assert!(text.contains("faces     6; by sides 4: 6\n") && text.contains("8; by valence 3: 8\n"), "{text}");
         assert!(text.contains("3,072 triangles in 24 grid pieces"), "{text}");
+    }
+
+    #[test]
+    fn an_edge_of_three_faces_counts_once() {
+        let positions = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1, 0, 1], [0, 0, 1], [1, -1, 0], [0, -1, 0]];
+        let positions = positions.map(|p| glam::IVec3::from_array(p).as_dvec3()).to_vec();
+        let pages = [vec![0, 1, 2, 3], vec![0, 1, 4, 5], vec![0, 1, 6, 7]];
+        let book = inventory(crate::mesh::ControlMesh::from_polygons(positions, &pages).unwrap());
+        assert_eq!(book.topology.nonmanifold_edges, 1);
+        assert_eq!(book.valences, BTreeMap::from([(2, 6), (4, 2)]));
     }
 
     #[test]
