@@ -4,7 +4,7 @@
 //! into a **grid** of triangles only when a ray needs it, and keeps grids in a **cache** of fixed size.
 //!
 //! ```text
-//!     OBJ + tags, scene.toml ──io──▶ ControlMesh ──topology──▶ Topology ──subdiv──▶ Surface (patches, plans, bounds)
+//!     OBJ + tags, scene.toml ──io──▶ ControlMesh ──topology──▶ Topology ──subdiv──▶ Surface (patches, plans, lattice)
 //!                                                                                      │ scene::accel
 //!                                                                                      ▼
 //!     camera ──▶ rays ──▶ Intersector { &World, cache pin } ◀── miss: dice, encode ──▶ SegmentCache

@@ -1,4 +1,4 @@
-//! What a render has cost and what a scene needs, in words for people and as JSON for programs.
+//! What a render has cost and what a scene needs, in words for people, as JSON for programs, and as plots.
 //!
 //! [`RenderStatistics`] and [`Inventory`] are plain data, filled by whoever ran the render or read the scene. Their
 //! JSON keys are an interface: those of a render are listed in `notes/statistics.md`, and a test compares the list with

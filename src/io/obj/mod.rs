@@ -1,8 +1,9 @@
 //! OBJ files with subdivision tags, read into a [`ControlMesh`].
 //!
-//! Polygons (`v`, `vt`, `f`) of any size and OpenSubdiv's `t` **tags**. Objects and groups (`o`, `g`, `usemtl`) do not
+//! Polygons (`v`, `f`) of up to 4096 sides and OpenSubdiv's `t` **tags**. Objects and groups (`o`, `g`, `usemtl`) do not
 //! split the mesh: faces and vertices keep their order in the file as their ids, and a vertex that two groups share is
-//! one vertex. Normals, materials, points and lines are passed over; free-form geometry is passed over with a warning.
+//! one vertex. Texture coordinates, normals, materials, points and lines are passed over; free-form geometry is passed
+//! over with a warning.
 //!
 //! A tag is `t NAME ints/floats/strings ARGUMENTS...`, its vertex and face numbers count from 0:
 //!
