@@ -27,7 +27,8 @@ pub enum Capacity {
 pub struct CacheConfig {
     /// Bytes of blocks.
     pub capacity: Capacity,
-    /// Segments of the ring, rounded up to a power of two and at least 2. `None`: chosen from the capacity.
+    /// Segments of the ring, rounded up to a power of two, from 2 to 2^20, but as many at least as a huge capacity
+    /// needs, whose segments have at most 16 MiB. `None`: chosen from the capacity.
     pub segments: Option<usize>,
     /// Pins that can use the cache at the same time. Pins beyond build every block for themselves.
     pub max_threads: usize,

@@ -13,6 +13,7 @@ use crate::mesh::ControlMesh;
 use crate::scene::intersect::Intersector;
 use crate::scene::rate::DicingRate;
 use crate::scene::world::{GridCache, World, WorldMesh};
+use crate::subdiv::MAX_RATE;
 use clap::Args;
 use glam::{DAffine3, DQuat, DVec3};
 use serde::Serialize;
@@ -237,9 +238,9 @@ impl FromStr for CheckRate {
     fn from_str(text: &str) -> Result<Self, String> {
         let rate = match text.strip_prefix("random:") {
             Some(seed) => seed.parse().ok().map(Self::Random),
-            None => text.parse().ok().filter(|n| (1..=4096).contains(n)).map(Self::Fixed),
+            None => text.parse().ok().filter(|n| (1..=MAX_RATE).contains(n)).map(Self::Fixed),
         };
-        rate.ok_or_else(|| format!("'{text}' is no rate: write N in 1..4096, or random:SEED"))
+        rate.ok_or_else(|| format!("'{text}' is no rate: write N in 1..{MAX_RATE}, or random:SEED"))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::cache::{CacheConfig, Capacity};
 use crate::scene::description::MOST_SAMPLES;
+use crate::subdiv::MAX_RATE;
 use glam::DVec3;
 use std::str::FromStr;
 
@@ -35,7 +36,7 @@ impl FromStr for ByteSize {
 pub enum CacheSize {
     /// At most so many bytes of grids; 0 keeps none.
     Bytes(u64),
-    /// Nothing is ever evicted.
+    /// Room for all that could be built; blocks are evicted only where the system does not lend that much.
     Unbounded,
 }
 
@@ -114,8 +115,8 @@ pub fn samples(text: &str) -> Result<u32, String> {
 
 /// Segments of an edge.
 pub fn fixed_rate(text: &str) -> Result<u32, String> {
-    let number = text.strip_prefix("fixed:").unwrap_or(text).parse().ok().filter(|n| (1..=4096).contains(n));
-    number.ok_or_else(|| format!("'{text}' is no rate: write a whole number of segments from 1 to 4096"))
+    let number = text.strip_prefix("fixed:").unwrap_or(text).parse().ok().filter(|n| (1..=MAX_RATE).contains(n));
+    number.ok_or_else(|| format!("'{text}' is no rate: write a whole number of segments from 1 to {MAX_RATE}"))
 }
 
 /// How many of something there may be very many of, typed like `100000`, `20k`, `10M`; K is 1000 here.

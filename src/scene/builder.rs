@@ -92,6 +92,20 @@ pub(super) fn child_cells(parent: CellRect, side: u32, a: u32, b: u32) -> CellRe
     }
 }
 
+/// The children of a node over these cells, row by row: their lanes and cells.
+pub(super) fn children_of(cells: CellRect) -> impl Iterator<Item = (usize, CellRect)> {
+    let side = child_side(cells);
+    let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
+    let all = (0..n_v).flat_map(move |b| (0..n_u).map(move |a| (a, b)));
+    all.map(move |(a, b)| ((NODE_SIDE * b + a) as usize, child_cells(cells, side, a, b)))
+}
+
+/// The ends of cells along u and along v.
+fn ranges(cells: CellRect) -> [[u32; 2]; 2] {
+    let CellRect { i0, j0, i1, j1 } = cells;
+    [[i0, i1], [j0, j1]].map(|range| range.map(u32::from))
+}
+
 impl<'w> Builder<'w> {
     /// A builder that notes accesses with `recorder`, if there is one.
     pub fn noting(recorder: Option<Recorder<'w>>) -> Self {
@@ -134,7 +148,7 @@ impl<'w> Builder<'w> {
 
     /// Puts the vertices of a piece into `self.vertices`.
     fn lay_out(&mut self, of: PatchContext<'_>, rates: &PatchRates, cells: CellRect) -> PieceLayout {
-        let (i, j) = ([u32::from(cells.i0), u32::from(cells.i1)], [u32::from(cells.j0), u32::from(cells.j1)]);
+        let [i, j] = ranges(cells);
         self.dicer.dice(of.mesh.surface(), of.patch, rates, i, j, &mut self.vertices);
         PieceLayout::new(&self.vertices, cells, [rates.n_u as u16, rates.n_v as u16])
     }
@@ -187,15 +201,12 @@ impl<'w> Builder<'w> {
         if no_holes && self.dicer.envelopes_of_parts(surface, of.patch, rates, parts, depth, out) {
             return [n_u as u8, n_v as u8];
         }
-        for b in 0..n_v {
-            for a in 0..n_u {
-                let c = child_cells(cells, side, a, b);
-                let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
-                self.envelopes.push(match surface.edited().hide_cells(of.patch, rates, i, j) {
-                    true => Envelope::EMPTY,
-                    false => self.dicer.envelope(surface, of.patch, rates, i, j, depth),
-                });
-            }
+        for (_, child) in children_of(cells) {
+            let [i, j] = ranges(child);
+            self.envelopes.push(match surface.edited().hide_cells(of.patch, rates, i, j) {
+                true => Envelope::EMPTY,
+                false => self.dicer.envelope(surface, of.patch, rates, i, j, depth),
+            });
         }
         [n_u as u8, n_v as u8]
     }
@@ -212,15 +223,11 @@ impl<'w> Builder<'w> {
         if !is_node(block.bytes()) {
             return;
         }
-        let cells = cells_of(block.bytes());
-        let side = child_side(cells);
-        let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
-        for (b, a) in (0..n_v).flat_map(|b| (0..n_u).map(move |a| (b, a))) {
-            let c = child_cells(cells, side, a, b);
-            let (i, j) = ([u32::from(c.i0), u32::from(c.i1)], [u32::from(c.j0), u32::from(c.j1)]);
-            let surface = of.mesh.surface();
-            if !surface.edited().hide_cells(of.patch, &of.mesh.patch_rates(of.patch), i, j) {
-                self.complete(visit, block.child((b * NODE_SIDE + a) as usize), of, Some(c));
+        let (rates, edited) = (self.rates(of), of.mesh.surface().edited());
+        for (lane, child) in children_of(cells_of(block.bytes())) {
+            let [i, j] = ranges(child);
+            if !edited.hide_cells(of.patch, &rates, i, j) {
+                self.complete(visit, block.child(lane), of, Some(child));
             }
         }
     }

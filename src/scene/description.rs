@@ -7,6 +7,7 @@
 //! Units: lengths are world units, angles degrees, colours linear RGB with Rec. 709 primaries. A white Lambert surface
 //! (diffuse 1) that faces a directional light of irradiance π has radiance 1, and so has one under a sky of radiance 1.
 
+use crate::subdiv::MAX_RATE;
 use glam::{DAffine3, DVec3, Vec3};
 use std::fmt;
 use std::path::PathBuf;
@@ -246,10 +247,10 @@ impl FromStr for Rate {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("'{text}' is no dicing rate: write fixed:N with N in 1..4096, or px:L with L > 0");
+        let wrong = || format!("'{text}' is no dicing rate: write fixed:N with N in 1..{MAX_RATE}, or px:L with L > 0");
         match text.split_once(':') {
             Some(("fixed", n)) => match n.parse() {
-                Ok(n @ 1..=4096) => Ok(Self::Fixed(n)),
+                Ok(n @ 1..=MAX_RATE) => Ok(Self::Fixed(n)),
                 _ => Err(wrong()),
             },
             Some(("px", l)) => match l.parse::<f64>() {

@@ -1,7 +1,7 @@
 //! All pieces of a patch, those that are not in the cache diced and forgotten: for what is found out once and
 //! remembered.
 
-use super::builder::{Builder, NODE_SIDE, PatchContext, child_cells, child_side, is_piece};
+use super::builder::{Builder, PatchContext, children_of, is_piece};
 use crate::cache::{Block, Visit};
 use crate::grid::{CellRect, MAX_CELLS, PieceView, cells_of};
 
@@ -55,11 +55,9 @@ impl<'r> Pieces<'r, '_, '_> {
             self.found.push(piece);
             return;
         }
-        let side = child_side(cells);
-        let [n_u, n_v] = cells.size().map(|n| (n as u32).div_ceil(side));
-        for (b, a) in (0..n_v).flat_map(|b| (0..n_u).map(move |a| (b, a))) {
-            let child = block.and_then(|block| self.visit.peek(block.child((NODE_SIDE * b + a) as usize)));
-            self.collect(child, child_cells(cells, side, a, b), builder, places);
+        for (lane, cells) in children_of(cells) {
+            let child = block.and_then(|block| self.visit.peek(block.child(lane)));
+            self.collect(child, cells, builder, places);
         }
     }
 }

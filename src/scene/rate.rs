@@ -5,10 +5,8 @@
 use super::camera::Camera;
 use super::description::Rate;
 use crate::mesh::shapes::noise::hash;
+use crate::subdiv::MAX_RATE;
 use glam::DVec3;
-
-/// The largest rate: more cells than this along an edge are never made.
-pub const MAX_RATE: u32 = 4096;
 
 /// A dicing rule with the camera it refers to.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -49,7 +49,7 @@ pub mod rules;
 mod stencils;
 pub mod surface;
 
-pub use dice::{Dicer, EqualParts, PatchRates, snapped};
+pub use dice::{Dicer, EqualParts, MAX_RATE, PatchRates, snapped};
 pub use eval::{Evaluator, SampleKind, SurfaceSample};
 pub use plan::{NodeId, PlanLibrary};
 pub use surface::{Lattice, Surface};

@@ -7,7 +7,7 @@ use crate::render::sampler::{hash2, pcg};
 use crate::render::tracer::{Built, Tracer};
 use crate::scene::camera::Camera;
 use crate::scene::description::DebugView;
-use crate::scene::rate::MAX_RATE;
+use crate::subdiv::MAX_RATE;
 use glam::Vec3;
 
 impl<'a, T: Tracer> Shader<'a, T> {
