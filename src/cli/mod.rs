@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn negative_numbers_are_refused_as_numbers() {
         for (line, message) in [
-            ("lazytess render a.obj -o a.png --spp -1", "'-1' is no count"),
+            ("lazytess render a.obj -o a.png --spp -1", "'-1' is no number of samples"),
             ("lazytess bench a.obj --rate -3", "'-3' is no rate"),
         ] {
             let refusal = Cli::definition().try_get_matches_from(line.split(' ')).unwrap_err().to_string();

@@ -117,7 +117,7 @@ fn too_small(budget: u64, smallest: u64, what: impl fmt::Display) -> Error {
 /// The refusal of a budget before all is known that will be needed: `least` bytes for `what`.
 pub fn too_small_for(what: &str, budget: u64, least: u64) -> Error {
     let (given, least) = (mebibytes(budget), mebibytes(with_margin(least)));
-    Error::new(ErrorKind::Budget, format!("--memory {given}M is too little to {what}: {least}M would do"))
+    Error::new(ErrorKind::Budget, format!("--memory {given}M is too little; {least}M would do to {what}"))
 }
 
 fn with_margin(bytes: u64) -> u64 {
