@@ -2,6 +2,7 @@
 
 use super::tradeoff::{Tradeoff, TradeoffRun};
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::error::Error;
 
 /// Colours of the ways of grouping, readable by most colour-blind people (Okabe and Ito 2008).
@@ -42,15 +43,50 @@ impl Tradeoff {
             let runs: Vec<_> = self.runs.iter().filter(|run| run.groups == name).collect();
             let points = runs.iter().map(|run| Circle::new((rays(run), run.p99()), 4, color.filled()));
             chart.draw_series(points)?;
-            let labels = runs.iter().map(|run| {
-                Text::new(run.label(), (1.03 * rays(run), run.p99() + 0.015 * worst), ("sans-serif", 11).into_font())
-            });
-            chart.draw_series(labels)?;
+        }
+        for Label { text, place: [x, y], is_left } in self.labels(LINE * worst) {
+            let (side, x) = if is_left { (HPos::Right, x / BESIDE) } else { (HPos::Left, x * BESIDE) };
+            let style = ("sans-serif", 11).into_text_style(&root).pos(Pos::new(side, VPos::Center));
+            chart.draw_series(std::iter::once(Text::new(text, (x, y), style)))?;
         }
         root.present()?;
         Ok(())
     }
+
+    /// One label for all runs at one place; those of places near each other lie on lines of their own, `line` apart.
+    fn labels(&self, line: f64) -> Vec<Label> {
+        let mut runs: Vec<&TradeoffRun> = self.runs.iter().collect();
+        runs.sort_by(|a, b| a.p99().total_cmp(&b.p99()).then(a.rays.cmp(&b.rays)));
+        let most = runs.iter().map(|run| run.rays).max().unwrap_or(1) as f64;
+        let mut labels: Vec<Label> = Vec::new();
+        for same in runs.chunk_by(|a, b| (a.rays, a.p99()) == (b.rays, b.p99())) {
+            let text = same.iter().map(|run| run.label()).collect::<Vec<_>>().join("; ");
+            let [x, mut y] = [same[0].rays.max(1) as f64, same[0].p99()];
+            for other in labels.iter().filter(|other| (x / other.place[0]).ln().abs() < NEAR.ln()) {
+                y = y.max(other.place[1] + line);
+            }
+            labels.push(Label { text, place: [x, y], is_left: x > 0.3 * most });
+        }
+        labels
+    }
 }
+
+/// What is written beside a point.
+struct Label {
+    text: String,
+    place: [f64; 2],
+    /// Left of it, because it lies at the right.
+    is_left: bool,
+}
+
+/// Between lines of labels, as a share of the vertical axis.
+const LINE: f64 = 0.026;
+
+/// From a point to its label, as a factor.
+const BESIDE: f64 = 1.03;
+
+/// Labels of points that are less than this factor apart would cover each other.
+const NEAR: f64 = 1.6;
 
 /// The numbers that have room along a logarithmic axis: one, two, three, five and seven times a power of ten.
 fn axis_label(value: f64) -> String {
