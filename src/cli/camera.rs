@@ -1,7 +1,7 @@
 //! Camera flags: they replace parts of the scene's camera, or of the default one.
 
 use super::PICTURE;
-use super::values::vector;
+use super::values::{field_of_view, vector};
 use crate::error::{Error, Result};
 use crate::scene::description::CameraDescription;
 use clap::Args;
@@ -20,7 +20,7 @@ pub struct CameraArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, help_heading = PICTURE)]
     pub up: Option<DVec3>,
     /// Vertical field of view in degrees
-    #[arg(long, value_name = "DEGREES", help_heading = PICTURE)]
+    #[arg(long, value_name = "DEGREES", value_parser = field_of_view, help_heading = PICTURE)]
     pub fov: Option<f64>,
 }
 

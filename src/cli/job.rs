@@ -149,8 +149,10 @@ impl<'a> RenderScene<'a> {
         let files: Vec<&Path> = self.scene.meshes.iter().map(|m| m.file.as_path()).collect();
         let sizes: Vec<u64> = files.iter().map(|file| file.metadata().map_or(0, |m| m.len())).collect();
         let (progress, total) = (Progress::new("MB of meshes read", quiet), megabytes(sizes.iter().sum()));
-        let read = files.iter().enumerate().map(|(i, file)| {
-            let before: u64 = sizes[..i].iter().sum();
+        let mut read_before = 0;
+        let read = files.iter().zip(&sizes).map(|(file, size)| {
+            let before = read_before;
+            read_before += size;
             let report = |n_read| progress.set(megabytes(before + n_read), total);
             let limit = self.memory.unwrap_or(u64::MAX);
             self.edits.load_mesh_with(file, &ReadOptions { limit, n_threads: threads, progress: &report })

@@ -4,7 +4,7 @@ use super::PICTURE;
 use super::camera::CameraArgs;
 use super::input::EditArgs;
 use super::job::RenderScene;
-use super::values::{crop, display_units, picture_size, samples};
+use super::values::{crop, depth, display_units, picture_size, samples};
 use crate::error::{Error, Result};
 use crate::render::{Aov, Groups, PixelRect, RenderSettings};
 use crate::scene::description::{IntegratorKind, Rate, SceneDescription};
@@ -26,7 +26,7 @@ pub struct PictureArgs {
     #[arg(long, value_name = "px:L|fixed:N", help_heading = PICTURE)]
     pub rate: Option<Rate>,
     /// Longest chain of reflections and refractions [default: the scene's, or 8]
-    #[arg(long, value_name = "N", help_heading = PICTURE)]
+    #[arg(long, value_name = "N", value_parser = depth, help_heading = PICTURE)]
     pub max_depth: Option<u32>,
     /// Occlusion rays per sample of the ao integrator [default: the scene's, or 16]
     #[arg(long, value_name = "N", value_parser = samples, help_heading = PICTURE)]

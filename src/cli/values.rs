@@ -1,7 +1,7 @@
 //! Values as they are typed: sizes, vectors, windows. Each parser's message says what to write.
 
 use crate::cache::{CacheConfig, Capacity};
-use crate::scene::description::MOST_SAMPLES;
+use crate::scene::description::{MOST_DEPTH, MOST_SAMPLES};
 use crate::subdiv::MAX_RATE;
 use glam::DVec3;
 use std::str::FromStr;
@@ -111,6 +111,18 @@ pub fn count(text: &str) -> Result<u32, String> {
 pub fn samples(text: &str) -> Result<u32, String> {
     let number = text.parse().ok().filter(|n| (1..=MOST_SAMPLES).contains(n));
     number.ok_or_else(|| format!("'{text}' is no number of samples: write a whole number from 1 to {MOST_SAMPLES}"))
+}
+
+/// The longest chain of reflections.
+pub fn depth(text: &str) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|n| (0..=MOST_DEPTH).contains(n));
+    number.ok_or_else(|| format!("'{text}' is no depth: write a whole number from 0 to {MOST_DEPTH}"))
+}
+
+/// A field of view in degrees.
+pub fn field_of_view(text: &str) -> Result<f64, String> {
+    let degrees = text.parse::<f64>().ok().filter(|degrees| *degrees > 0.0 && *degrees < 180.0);
+    degrees.ok_or_else(|| format!("'{text}' is no field of view: write degrees between 0 and 180"))
 }
 
 /// Segments of an edge.

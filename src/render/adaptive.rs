@@ -76,7 +76,7 @@ pub fn render_adaptive<T: Tracer>(
         return render(camera, appearance, settings, run, make_tracer);
     }
     let scenery = Scenery::new(world, camera, settings);
-    let job = Interpolation { camera, appearance, settings };
+    let job = Interpolation { run, camera, appearance, settings };
     let in_workers = |threads: usize, work: &(dyn Fn(&mut Worker<'_, '_, T>) + Sync)| {
         let outcomes = on_threads(threads, || {
             let mut tracer = make_tracer();
@@ -97,6 +97,9 @@ pub fn render_adaptive<T: Tracer>(
     let next = AtomicUsize::new(0);
     let mut seams = in_workers(run.threads.min(surprises.len()), &|worker| {
         while let Some(surprises) = surprises.get(next.fetch_add(1, Ordering::Relaxed)) {
+            if run.cancel.load(Ordering::Relaxed) {
+                break;
+            }
             worker.follow_across_seams(surprises, &canvas);
         }
     });
@@ -167,7 +170,9 @@ impl<T: Tracer> Worker<'_, '_, T> {
                 self.outcome.pixels.add(Reason::Background, area.intersection(shown).n_pixels() as u64);
                 canvas.lock().fill(area, &self.job.background());
             } else {
-                self.render(area, &mut records);
+                if !self.render(area, &mut records) {
+                    break;
+                }
                 let counted = area.pixels().zip(&records).filter(|(pixel, _)| shown.idx(*pixel).is_some());
                 counted.for_each(|(_, record)| self.outcome.pixels.add(record.reason, 1));
                 canvas.lock().store(area, &records);
@@ -176,8 +181,9 @@ impl<T: Tracer> Worker<'_, '_, T> {
         }
     }
 
-    /// Fills `records` with the pixels of a tile.
-    fn render(&mut self, tile: PixelRect, records: &mut Vec<PixelRecord>) {
+    /// Fills `records` with the pixels of a tile; returns whether they are complete, which those of a tile of many
+    /// samples are not if the render was cancelled meanwhile.
+    fn render(&mut self, tile: PixelRect, records: &mut Vec<PixelRecord>) -> bool {
         let watch = Instant::now();
         records.clear();
         records.resize(tile.n_pixels(), self.job.background());
@@ -203,6 +209,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         self.follow_within(tile, records);
         self.outcome.seconds.trace += (watch.elapsed() - interpolated).as_secs_f64();
         self.outcome.seconds.interpolate += interpolated.as_secs_f64();
+        !self.job.is_given_up()
     }
 
     fn is_grouped(&self) -> bool {
@@ -213,6 +220,9 @@ impl<T: Tracer> Worker<'_, '_, T> {
     fn trace_all(&mut self, tile: PixelRect, records: &mut [PixelRecord]) {
         self.along_curve(tile, |worker, pixels| {
             for pixel in pixels {
+                if worker.job.is_given_up() {
+                    return;
+                }
                 records[tile.idx(pixel).expect("the curve stays in the tile")] = worker.traced(pixel);
             }
         });
@@ -229,7 +239,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
         let per_cell = CELL_SIDES[0].pow(2);
         for first in (0..TILE_SIDE.pow(2)).step_by(per_cell as usize) {
             let largest = self.tile.place(0, place(first));
-            if matches!(self.tile.cell(&largest), Cell::Empty | Cell::Undivided) {
+            if self.job.is_given_up() || matches!(self.tile.cell(&largest), Cell::Empty | Cell::Undivided) {
                 continue;
             }
             self.shader.aim(self.job.camera, largest.pixels());

@@ -10,13 +10,14 @@ use super::follow::Shown;
 use super::integrators::{LightMasks, Probe, Smooth, SmoothPoint};
 use super::reason::Reason;
 use super::sampler::subpixel;
-use super::settings::{Appearance, RenderSettings};
+use super::settings::{Appearance, RenderSettings, RunSettings};
 use super::tracer::Built;
-use super::workers::PixelTracer;
+use super::workers::{PixelTracer, SAMPLES_AT_ONCE};
 use crate::ids::MeshId;
 use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
 use glam::{DVec2, DVec3, Vec2, Vec3};
+use std::sync::atomic::Ordering;
 
 /// Steps from one pixel to the next, in display units, that are followed whatever the tolerance: an edge may begin
 /// faintly. With
@@ -42,12 +43,18 @@ const MIDDLES: [(usize, Vec2); 5] = [
 
 /// Turns probes into pixels; knows no tracer.
 pub(super) struct Interpolation<'a> {
+    pub run: &'a RunSettings<'a>,
     pub camera: &'a Camera,
     pub appearance: &'a Appearance,
     pub settings: &'a RenderSettings,
 }
 
 impl<'a> Interpolation<'a> {
+    /// Whether tiles that were begun are not finished any more.
+    pub fn is_given_up(&self) -> bool {
+        self.settings.spp > SAMPLES_AT_ONCE && self.run.cancel.load(Ordering::Relaxed)
+    }
+
     pub fn is_possible(&self) -> bool {
         self.settings.integrator == IntegratorKind::Whitted && self.appearance.lights.len() <= LightMasks::CAPACITY
     }

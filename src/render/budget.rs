@@ -101,9 +101,14 @@ fn group_bytes(settings: &RenderSettings, threads: usize) -> usize {
     }
 }
 
-/// Bytes of the canvas of adaptive groups, besides those of the film.
+/// Bytes of the canvas of adaptive groups, besides those of the film. Where it is larger than the film, this is cut out
+/// of it while both are there.
 fn canvas_bytes(settings: &RenderSettings) -> usize {
-    Canvas::n_bytes(canvas_window(settings), &settings.aovs) - Film::n_bytes(settings.window, &settings.aovs)
+    let canvas = Canvas::n_bytes(canvas_window(settings), &settings.aovs);
+    if canvas_window(settings) == settings.window {
+        return canvas - Film::n_bytes(settings.window, &settings.aovs);
+    }
+    canvas
 }
 
 /// The error of a budget below `smallest`, which is needed for `what`. Names a little more, because what is resident
@@ -117,7 +122,7 @@ fn too_small(budget: u64, smallest: u64, what: impl fmt::Display) -> Error {
 /// The refusal of a budget before all is known that will be needed: `least` bytes for `what`.
 pub fn too_small_for(what: &str, budget: u64, least: u64) -> Error {
     let (given, least) = (mebibytes(budget), mebibytes(with_margin(least)));
-    Error::new(ErrorKind::Budget, format!("--memory {given}M is too little; {least}M would do to {what}"))
+    Error::new(ErrorKind::Budget, format!("--memory {given}M is too little; {least}M or so are needed to {what}"))
 }
 
 fn with_margin(bytes: u64) -> u64 {

@@ -39,6 +39,17 @@ pub fn mean_value_weights(p: DVec2, polygon: [DVec2; 4]) -> Option<[f64; 4]> {
     if let Some(k) = lengths.iter().position(|&length| length < 1e-9) {
         return Some(std::array::from_fn(|i| f64::from(u8::from(i == k))));
     }
+    // On an edge its two corners alone count; tangents are infinite there.
+    let is_on_edge = |k: &usize| {
+        let (a, b) = (arms[*k], arms[(k + 1) % 4]);
+        a.perp_dot(b).abs() <= 1e-9 * lengths[*k] * lengths[(k + 1) % 4] && a.dot(b) < 0.0
+    };
+    if let Some(k) = (0..4).find(is_on_edge) {
+        let (a, b) = (lengths[k], lengths[(k + 1) % 4]);
+        let mut weights = [0.0; 4];
+        (weights[k], weights[(k + 1) % 4]) = (b / (a + b), a / (a + b));
+        return Some(weights);
+    }
     let half_tangent = |k: usize| {
         let (a, b) = (arms[k], arms[(k + 1) % 4]);
         let cosine = a.dot(b) + lengths[k] * lengths[(k + 1) % 4];
@@ -54,6 +65,20 @@ pub fn mean_value_weights(p: DVec2, polygon: [DVec2; 4]) -> Option<[f64; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points_on_edges_are_mixed_of_their_ends() {
+        let rhombus = [[2.0, 0.0], [4.0, 2.0], [2.0, 4.0], [0.0, 2.0]].map(DVec2::from);
+        let near = |p: [f64; 2], polygon, expected: [f64; 4]| {
+            let weights = mean_value_weights(p.into(), polygon).unwrap();
+            assert!(weights.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{p:?}: {weights:?}");
+        };
+        near([3.0, 1.0], rhombus, [0.5, 0.5, 0.0, 0.0]);
+        near([2.5, 0.5], rhombus, [0.75, 0.25, 0.0, 0.0]);
+        let square = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]].map(DVec2::from);
+        near([0.0, 1.0], square, [0.75, 0.0, 0.0, 0.25]);
+        near([2.0, 2.0], square, [0.25; 4]);
+    }
 
     const KITE: [DVec2; 4] = [DVec2::new(3.0, 0.0), DVec2::new(7.0, 4.0), DVec2::new(4.0, 9.0), DVec2::new(0.0, 3.0)];
 

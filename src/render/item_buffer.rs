@@ -81,12 +81,6 @@ impl ItemBuffer {
         (bits != EMPTY).then_some(bits as u32)
     }
 
-    /// Depth of the proxy along the camera's forward direction; infinite where none is seen.
-    pub fn depth(&self, pixel: usize) -> f32 {
-        let bits = self.pixels[pixel].load(Ordering::Relaxed);
-        if bits == EMPTY { f32::INFINITY } else { f32::from_bits((bits >> 32) as u32) }
-    }
-
     fn put(&self, pixel: usize, depth: f64, item: u32) {
         let bits = u64::from((depth as f32).to_bits()) << 32 | u64::from(item);
         self.pixels[pixel].fetch_min(bits, Ordering::Relaxed);

@@ -16,7 +16,6 @@ use super::item_buffer::ItemBuffer;
 use super::rays::RayCounts;
 use super::reason::{PixelCounts, Reason};
 use super::settings::{Appearance, RenderSettings, RunSettings};
-use super::tiles::PixelRect;
 use super::tracer::Tracer;
 use super::workers::{GroupSeconds, PixelTracer, Rendered, TileQueue};
 use crate::parallel::on_threads;
@@ -24,7 +23,7 @@ use crate::scene::camera::Camera;
 use glam::{DVec2, Vec3};
 use parking_lot::Mutex;
 use rustc_hash::FxHashMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Corner pixels a thread traces before it asks for more.
@@ -41,7 +40,9 @@ pub enum Interpolation {
 
 /// Bytes that groups and their corners take at most: every pixel may be a group of its own.
 pub(super) fn max_bytes(settings: &RenderSettings) -> usize {
-    let per_pixel = 8 + size_of::<u32>() + 2 * size_of::<[u32; 4]>() + 2 * size_of::<PixelRecord>();
+    // A list of corners that doubles as it grows holds up to three times what it needs, a table of them up to 3.5 times.
+    let traced = 7 * size_of::<(u32, PixelRecord)>();
+    let per_pixel = 8 + size_of::<u32>() + 2 * size_of::<[u32; 4]>() + traced;
     settings.size.iter().map(|&n| n as usize).product::<usize>() * per_pixel
 }
 
@@ -66,6 +67,9 @@ pub fn render_thesis<T: Tracer>(
     let picture =
         Picture { groups: &groups, traced: &traced, settings, interpolation, background: appearance.background };
     let film = Mutex::new(Film::new(settings.window, &settings.aovs));
+    // What was traced before a cancellation is kept.
+    let never = AtomicBool::new(false);
+    let run = &RunSettings { cancel: &never, ..*run };
     let queue = TileQueue::new(settings.window, run.tile_side, run);
     let counts = on_threads(run.threads, || picture.expose(&queue, &film));
     let mut pixels = PixelCounts::default();
@@ -142,36 +146,36 @@ impl Picture<'_> {
     fn expose(&self, queue: &TileQueue<'_>, film: &Mutex<Film>) -> PixelCounts {
         let mut counts = PixelCounts::default();
         while let Some(tile) = queue.next_tile() {
-            let records: Vec<PixelRecord> = tile.pixels().map(|pixel| self.record(pixel)).collect();
+            // A cancelled render may lack corners.
+            let records: Option<Vec<PixelRecord>> = tile.pixels().map(|pixel| self.record(pixel)).collect();
+            let Some(records) = records else { continue };
             records.iter().for_each(|record| counts.add(record.reason, 1));
-            self.store(tile, &records, film);
+            film.lock().store(tile, &records);
             queue.report(tile.n_pixels());
         }
         counts
     }
 
-    fn store(&self, tile: PixelRect, records: &[PixelRecord], film: &Mutex<Film>) {
-        film.lock().store(tile, records);
-    }
-
-    fn record(&self, [x, y]: [u32; 2]) -> PixelRecord {
+    /// `None` if a corner was not traced.
+    fn record(&self, [x, y]: [u32; 2]) -> Option<PixelRecord> {
         let pixel = y * self.settings.size[0] + x;
         let group = self.groups.of_pixels()[pixel as usize];
         if group == NO_GROUP {
-            return PixelRecord::background(self.background.to_array());
+            return Some(PixelRecord::background(self.background.to_array()));
         }
         if let Some(record) = self.traced.get(&pixel) {
-            return PixelRecord { group, reason: Reason::Corner, ..*record };
+            return Some(PixelRecord { group, reason: Reason::Corner, ..*record });
         }
         let [top, bottom, left, right] = self.groups.corners()[group as usize];
         let quad = [top, right, bottom, left];
-        // A cancelled render may lack corners.
-        let known = |corner: u32| self.traced.get(&corner).map_or(self.background, |r| Vec3::from(r.color));
-        let color =
-            self.interpolated(DVec2::new(f64::from(x), f64::from(y)), quad.map(|c| self.place(c)), quad.map(known));
-        let first = quad.iter().find_map(|c| self.traced.get(c)).map(|record| record.first);
+        let mut known = [Vec3::ZERO; 4];
+        for (color, corner) in known.iter_mut().zip(&quad) {
+            *color = Vec3::from(self.traced.get(corner)?.color);
+        }
+        let color = self.interpolated(DVec2::new(f64::from(x), f64::from(y)), quad.map(|c| self.place(c)), known);
+        let first = self.traced.get(&top)?.first;
         let background = PixelRecord::background(color.to_array());
-        PixelRecord { group, reason: Reason::Interpolated, first: first.unwrap_or(background.first), ..background }
+        Some(PixelRecord { group, reason: Reason::Interpolated, first, ..background })
     }
 
     fn interpolated(&self, p: DVec2, places: [DVec2; 4], colors: [Vec3; 4]) -> Vec3 {

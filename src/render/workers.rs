@@ -83,7 +83,7 @@ pub fn render<T: Tracer>(
 
 /// With more samples a pixel than this a tile that was begun is given up when the render is cancelled; with fewer it is
 /// finished, which takes no time that anybody would notice.
-const SAMPLES_AT_ONCE: u32 = 64;
+pub(super) const SAMPLES_AT_ONCE: u32 = 64;
 
 /// Hands out tiles until there are no more, or the render is cancelled.
 pub(super) struct TileQueue<'a> {

@@ -68,10 +68,11 @@ impl RenderStatistics {
     fn write_cache(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let c = &self.cache;
         let size = c.capacity_bytes.map_or("unbounded".to_owned(), |bytes| Bytes(bytes).to_string());
-        let hits = percent(c.hits, c.lookups);
+        let (hits, private) = (percent(c.hits, c.lookups), percent(c.private_hits, c.lookups));
+        let own = if c.private_hits > 0 { format!(", {private} a thread's own block") } else { String::new() };
         writeln!(
             f,
-            "cache     {size}, at most {} in use; {hits} of {} lookups hit",
+            "cache     {size}, at most {} in use; {hits} of {} lookups hit{own}",
             Bytes(c.peak_bytes),
             Count(c.lookups)
         )?;

@@ -4,8 +4,6 @@ use super::description::CameraDescription;
 use crate::math::{DBounds, Ray, RayBounds};
 use glam::{DVec2, DVec3};
 
-/// Vertical field of view of the default camera, in degrees.
-const DEFAULT_FOV: f64 = 35.0;
 /// Distance of the default camera from the centre of what it frames, in diagonals of its box.
 const DEFAULT_DISTANCE: f64 = 1.35;
 
@@ -108,7 +106,7 @@ impl CameraDescription {
         let at = if bounds.is_empty() { DVec3::ZERO } else { bounds.center() };
         let diagonal = if bounds.diagonal() > 0.0 { bounds.diagonal() } else { 1.0 };
         let eye = at + (DEFAULT_DISTANCE * diagonal) * DVec3::new(1.0, 0.6, 1.2).normalize();
-        Self { eye, at, up: DVec3::Y, fov: DEFAULT_FOV }
+        Self { eye, at, up: DVec3::Y, fov: CameraDescription::DEFAULT_FOV }
     }
 
     /// The same for pictures of that size: if they are narrower than 4 to 3, from so far away that they are as wide as
@@ -178,7 +176,7 @@ mod tests {
         let camera = cube_camera();
         let top = camera.ray(DVec2::new(400.0, 0.0), [800, 600]).direction;
         assert!(top.y > camera.forward().y);
-        assert!((top.dot(camera.forward()).acos().to_degrees() - DEFAULT_FOV / 2.0).abs() < 1e-9);
+        assert!((top.dot(camera.forward()).acos().to_degrees() - CameraDescription::DEFAULT_FOV / 2.0).abs() < 1e-9);
     }
 
     #[test]

@@ -44,6 +44,9 @@ pub struct CameraDescription {
 /// Samples of a pixel, and occlusion rays of a sample, at most: more would not be seen, and could hardly be waited for.
 pub const MOST_SAMPLES: u32 = 65536;
 
+/// Longest chain of reflections and refractions: between two mirrors a longer one never ends, either.
+pub const MOST_DEPTH: u32 = 1024;
+
 /// `[render]`: what the scene's author suggests. `None` leaves it to the command line and its defaults.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderDefaults {

@@ -34,11 +34,12 @@ const MAX_BYTES: u64 = 1 << 26;
 
 /// Reads a scene and makes sure that its mesh files exist.
 pub fn read_scene(path: &Path) -> Result<SceneDescription> {
-    let parsed = parse(&read_text(path)?, path)?;
-    for (mesh, &line) in parsed.scene.meshes.iter().zip(&parsed.mesh_lines) {
+    let text = read_text(path)?;
+    let parsed = parse(&text, path)?;
+    for (mesh, &offset) in parsed.scene.meshes.iter().zip(&parsed.mesh_offsets) {
         if !mesh.file.exists() {
             let message = format!("the mesh file {} does not exist", mesh.file.display());
-            return Err(Error::input(message).at(path, Some(line)));
+            return Err(Error::input(message).at(path, Some(line_of(&text, offset))));
         }
     }
     Ok(parsed.scene)
@@ -51,8 +52,8 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneDescription> {
 
 struct Parsed {
     scene: SceneDescription,
-    /// The line that names each mesh's file.
-    mesh_lines: Vec<usize>,
+    /// Where in the text each mesh's file is named.
+    mesh_offsets: Vec<usize>,
 }
 
 fn parse(text: &str, path: &Path) -> Result<Parsed> {
@@ -61,10 +62,10 @@ fn parse(text: &str, path: &Path) -> Result<Parsed> {
         let message = e.message().lines().collect::<Vec<_>>().join("; ");
         Error::input(message).at(path, e.span().map(|span| place(span.start)))
     })?;
-    let mesh_lines = tables.mesh.iter().map(|mesh| place(mesh.get_ref().file.span().start)).collect();
+    let mesh_offsets = tables.mesh.iter().map(|mesh| mesh.get_ref().file.span().start).collect();
     let scene = resolve::resolve(tables, path.parent().unwrap_or(Path::new("")))
         .map_err(|e| Error::input(e.message).at(path, e.offset.map(place)))?;
-    Ok(Parsed { scene, mesh_lines })
+    Ok(Parsed { scene, mesh_offsets })
 }
 
 fn line_of(text: &str, offset: usize) -> usize {

@@ -5,7 +5,8 @@ use super::tables::{
 };
 use super::values::{Colour, Number, Share};
 use crate::scene::description::{
-    Albedo, CameraDescription, Glass, Light, MOST_SAMPLES, Material, MeshDescription, RenderDefaults, SceneDescription,
+    Albedo, CameraDescription, Glass, Light, MOST_DEPTH, MOST_SAMPLES, Material, MeshDescription, RenderDefaults,
+    SceneDescription,
 };
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
 use std::collections::BTreeMap;
@@ -69,12 +70,15 @@ fn render(table: RenderTable) -> Result<RenderDefaults> {
             return Err(mistake(count, format!("a number of samples should be in 1..{MOST_SAMPLES}")));
         }
     }
+    if let Some(depth) = table.max_depth.as_ref().filter(|depth| *depth.get_ref() > MOST_DEPTH) {
+        return Err(mistake(depth, format!("a chain of reflections has at most {MOST_DEPTH} links")));
+    }
     Ok(RenderDefaults {
         size: table.size.map(Spanned::into_inner),
         spp: table.spp.map(Spanned::into_inner),
         integrator: table.integrator,
         rate: table.rate,
-        max_depth: table.max_depth,
+        max_depth: table.max_depth.map(Spanned::into_inner),
         ao_samples: table.ao_samples.map(Spanned::into_inner),
     })
 }

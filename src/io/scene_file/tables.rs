@@ -39,7 +39,7 @@ pub struct RenderTable {
     pub integrator: Option<IntegratorKind>,
     #[serde(default, deserialize_with = "parsed")]
     pub rate: Option<Rate>,
-    pub max_depth: Option<u32>,
+    pub max_depth: Option<Spanned<u32>>,
     pub ao_samples: Option<Spanned<u32>>,
 }
 
