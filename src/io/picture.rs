@@ -23,7 +23,7 @@ pub struct ImageLayers {
     pub place: [usize; 2],
     /// Columns and rows of the whole picture.
     pub whole: [usize; 2],
-    /// Layers; their names differ.
+    /// Layers; several may have the empty name.
     pub layers: Vec<Layer>,
 }
 

@@ -24,7 +24,8 @@
 //!    neither threads nor a crop change a pixel. A picture that was cancelled may lack edges that lead from one tile to
 //!    the next.
 //! 3. A pixel that is not interpolated has, bit for bit, the colour that it has without groups; but where pixels have
-//!    several samples, some are settled with two of them (`samples`).
+//!    several samples, corners and probes of cells that hold have the first one alone, and some others are settled with
+//!    two of them (`samples`).
 //!
 //! Ke, "Feature Adaptive Ray Tracing of Subdivision Surfaces", 2017, chapter 5.3 (groups); Akimoto et al.,
 //! "Pixel-selected ray tracing", 1991 (refinement by prediction).

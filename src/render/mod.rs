@@ -14,7 +14,7 @@
 //! # Invariants
 //! 1. A pixel is a function of the scene, the camera and the render settings: every random number is a function of
 //!    (seed, pixel, sample, purpose). Threads, tile size and crop window change nothing.
-//! 2. Nothing is allocated per ray, pixel or tile.
+//! 2. Nothing is allocated per ray or traced pixel. (Adaptive groups keep short lists of a tile's cells and edges.)
 //! 3. Colours are linear RGB radiance; the film never tone maps.
 //!
 //! With **pixel groups** most pixels are not traced: an [`item_buffer`] of proxies, [`groups`] of equal pixels and

@@ -13,7 +13,8 @@
 //! point, and has to be more alike.
 //!
 //! # Invariants
-//! 1. A settled pixel has two samples, any other traced one has all, bit for bit those that it has without groups.
+//! 1. A settled pixel has two samples, a corner or probe of a cell that holds its first one alone, any other traced one
+//!    all, bit for bit those that it has without groups.
 //! 2. Pixels at the sides of a tile are never settled: their neighbours beyond are not known.
 
 use super::adaptive::{CREASE_COSINE, Worker};
