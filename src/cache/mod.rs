@@ -49,11 +49,12 @@
 //! publishes. So a builder that the system puts to sleep delays nobody, and since equal slots have equal bytes it does
 //! not matter whose block it is.
 //!
-//! **Recycling.** Who finds the current segment full makes the next one current: as long as there are segments that
-//! were never used without more ado, later if every pin stands at `head + 1 - G` or later. Any number of threads may try at once. If a pin lags behind, or if the block is larger than a segment, the
-//! block is built in memory of the thread's own and seen by no other: a **bypass**. Blocks below it are bypassed, too.
-//! A thread remembers the last [`SegmentCache::SCRATCH_BYTES`] of such blocks: without any cache, the next ray often
-//! needs what the last ones have built.
+//! **Recycling.** Who finds the current segment full makes the next one current: without more ado as long as there are
+//! segments that were never used, later if every pin stands at `head + 1 - G` or later. Any number of threads may try
+//! at once. If a pin lags behind, or if the block is larger than a segment, the block is built in memory of the
+//! thread's own and seen by no other: a **bypass**. Blocks below it are bypassed, too. A thread remembers the last
+//! [`SegmentCache::SCRATCH_BYTES`] of such blocks: without any cache, the next ray often needs what the last ones have
+//! built.
 //!
 //! A thread that the system puts to sleep in the middle of a visit pins a segment until it runs again, which with more
 //! threads than processors is soon the state of them all. So a thread that was bypassed because of a pin gives up its

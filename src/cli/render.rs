@@ -106,7 +106,8 @@ impl RenderArgs {
     pub fn job(self) -> Result<RenderJob> {
         let format = PictureFormat::of(&self.output)?;
         if format == PictureFormat::Png && !self.aov.iter().all(|&aov| output::is_drawn(aov)) {
-            return Err(Error::input("--aov needs an EXR file: a PNG has no layers, and beside it lie pictures of group, reason and error only").at(&self.output, None));
+            let message = "--aov needs an EXR file: beside a PNG lie pictures of group, reason and error only";
+            return Err(Error::input(message).at(&self.output, None));
         }
         if let Some(twice) = (1..self.aov.len()).find(|&i| self.aov[..i].contains(&self.aov[i])) {
             return Err(Error::input(format!("--aov names {} twice", self.aov[twice])));
