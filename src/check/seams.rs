@@ -6,7 +6,7 @@ use crate::ids::FaceId;
 use crate::parallel::on_threads;
 use crate::scene::world::WorldMesh;
 use crate::subdiv::Dicer;
-use crate::subdiv::dice::snapped;
+use crate::subdiv::snapped;
 use parking_lot::Mutex;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

@@ -4,7 +4,7 @@ use super::incidence::SideRun;
 use crate::ids::PatchId;
 use crate::math::LatticeGrid;
 use crate::scene::world::WorldMesh;
-use crate::subdiv::dice::snapped;
+use crate::subdiv::snapped;
 use crate::subdiv::{Dicer, PatchRates};
 
 /// Lattice coordinates of a grid vertex.

@@ -22,7 +22,7 @@
 //!    rounding to the lattice with that guard makes shared borders equal to the bit.
 //!
 //! Sources: Catmull & Clark 1978; Stam 1998; Nießner et al. 2012; Brainerd et al. 2016 (plans); OpenSubdiv's rules.
-//! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`dice`], [`edits`]. [`refine`] is the slow
+//! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`rates`], [`dice`], [`edits`]. [`refine`] is the slow
 //! reference. What most irregular patches come to is written out: one step and boxes around a lone extraordinary vertex
 //! in `pole`, the points beside it in `stencils`. `kinds` finds the faces that share a plan, by the `fans` at their
 //! corners if it can, and has their nodes drafted (`draft`); `route` finds the vertices of a ring whose plan is known.
@@ -31,6 +31,7 @@ mod bounds;
 pub mod dice;
 mod draft;
 pub mod edits;
+mod envelopes;
 pub mod eval;
 mod extent;
 mod fans;
@@ -41,6 +42,7 @@ mod parts;
 pub mod plan;
 mod pole;
 mod products;
+pub mod rates;
 pub mod refine;
 pub mod regular;
 mod route;
@@ -49,7 +51,9 @@ pub mod rules;
 mod stencils;
 pub mod surface;
 
-pub use dice::{Dicer, EqualParts, MAX_RATE, PatchRates, snapped};
+pub use dice::Dicer;
+pub use envelopes::EqualParts;
 pub use eval::{Evaluator, SampleKind, SurfaceSample};
 pub use plan::{NodeId, PlanLibrary};
+pub use rates::{MAX_RATE, PatchRates, snapped};
 pub use surface::{Lattice, Surface};

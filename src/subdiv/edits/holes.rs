@@ -8,7 +8,7 @@
 use crate::error::{Error, Result};
 use crate::ids::{FaceId, PatchId};
 use crate::mesh::{ControlMesh, Edit, EditKind};
-use crate::subdiv::dice::PatchRates;
+use crate::subdiv::rates::PatchRates;
 use crate::topology::{HalfEdges, Topology};
 use rustc_hash::FxHashMap;
 

@@ -23,9 +23,9 @@ mod ring;
 mod sites;
 mod trie;
 
-use super::dice::PatchRates;
 use super::eval::Point;
 use super::plan::{NodeId, PlanLibrary};
+use super::rates::PatchRates;
 use super::surface::Lattice;
 use crate::error::Result;
 use crate::ids::{FaceId, PatchId};
