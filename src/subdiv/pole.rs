@@ -18,7 +18,7 @@
 
 use super::eval::Point;
 use super::local::LocalMesh;
-use super::regular::whole_hull;
+use super::regular::{bezier_points, bezier_points_of_two};
 use super::rows::Index;
 use super::rules::RefinedView;
 use crate::math::simd::{Kernel, Task};
@@ -29,6 +29,9 @@ pub(super) const N_OUTER: usize = 7;
 
 /// Refined points that the quarter at the apex does not have.
 pub(super) const N_BEYOND: usize = 9;
+
+/// Refined points outside the quarter's fan.
+const N_OUTSIDE: usize = N_OUTER + N_BEYOND;
 
 /// The half-edges of a pole from which all its points can be told.
 pub(super) struct Pole<'a> {
@@ -118,74 +121,70 @@ fn vertex_point<K: Kernel>(k: K, p: K::D, edges: [K::D; 4], faces: [K::D; 4]) ->
 }
 
 impl<I: Index> PoleStep<'_, I> {
-    /// Point `i` of the ring.
+    /// A point of the ring.
     #[inline(always)]
-    fn at<K: Kernel>(&self, k: K, i: usize) -> K::D {
-        k.load4(&self.points[self.ring[i].idx()].0)
+    fn at<K: Kernel>(&self, k: K, i: I) -> K::D {
+        k.load4(&self.points[i.idx()].0)
     }
 
+    /// Writes what comes of the fan, two for each face; returns what comes of the apex.
     #[inline(always)]
-    fn set<K: Kernel>(&mut self, k: K, i: usize, p: K::D) {
-        self.out[i].0 = k.store4(p);
-    }
-
-    /// The points that come of the apex and its fan of `n` faces.
-    #[inline(always)]
-    fn fan<K: Kernel>(&mut self, k: K, n: usize) {
-        let apex = self.at(k, 0);
-        let first = self.at(k, 1);
+    fn refine_fan<K: Kernel>(&self, k: K, apex: K::D, fan: &[I], out: &mut [Point]) -> K::D {
+        let n = fan.len() / 2;
+        let first = self.at(k, fan[0]);
+        let mut before = mean(k, apex, self.at(k, fan[2 * n - 2]), self.at(k, fan[2 * n - 1]), first);
         let (mut edge, mut edges, mut faces) = (first, k.splat4(0.0), k.splat4(0.0));
-        for i in 0..n {
-            let next = if i + 1 < n { self.at(k, 2 * i + 3) } else { first };
-            let face = mean(k, apex, edge, self.at(k, 2 * i + 2), next);
-            self.set(k, 2 * i + 2, face);
+        for (i, (pair, out)) in fan.chunks_exact(2).zip(out.chunks_exact_mut(2)).enumerate() {
+            let next = if i + 1 < n { self.at(k, fan[2 * i + 2]) } else { first };
+            let face = mean(k, apex, edge, self.at(k, pair[1]), next);
+            out[0].0 = k.store4(mean(k, apex, edge, before, face));
+            out[1].0 = k.store4(face);
             (edges, faces) = (k.add4(edges, edge), k.add4(faces, face));
-            edge = next;
-        }
-        let mut before = k.load4(&self.out[2 * n].0);
-        for i in 0..n {
-            let face = k.load4(&self.out[2 * i + 2].0);
-            let point = mean(k, apex, self.at(k, 2 * i + 1), before, face);
-            self.set(k, 2 * i + 1, point);
-            before = face;
+            (edge, before) = (next, face);
         }
         let n = n as f64;
         let sum = k.mul4(k.add4(edges, faces), k.splat4(1.0 / (n * n)));
-        self.set(k, 0, k.add4(k.mul4(apex, k.splat4((n - 2.0) / n)), sum));
+        k.add4(k.mul4(apex, k.splat4((n - 2.0) / n)), sum)
     }
 
-    /// The others.
+    /// Writes what comes of the points around, of which `refined_fan` is there already.
     #[inline(always)]
-    fn outside<K: Kernel>(&mut self, k: K, n: usize) {
-        let outer = 1 + 2 * n;
-        let (e0, f0, e1, f1, f_last) = (self.at(k, 1), self.at(k, 2), self.at(k, 3), self.at(k, 4), self.at(k, 2 * n));
-        let (apex, p1, p2, p3) = (self.at(k, 0), self.at(k, outer), self.at(k, outer + 1), self.at(k, outer + 2));
-        let (p4, p5) = (self.at(k, outer + 3), self.at(k, outer + 4));
-        let (p6, p7) = (self.at(k, outer + 5), self.at(k, outer + 6));
-        let face = [k.load4(&self.out[2].0), k.load4(&self.out[4].0), k.load4(&self.out[2 * n].0)];
-        let [face_0, face_1, face_last] = face;
+    fn refine_outside<K: Kernel>(
+        &self,
+        k: K,
+        apex: K::D,
+        fan: &[I],
+        refined_fan: &[Point],
+        out: &mut [Point; N_OUTSIDE],
+    ) {
+        let outer: &[I; N_OUTER] = self.ring.last_chunk().expect("a pole's points");
+        let (e0, f0, e1) = (self.at(k, fan[0]), self.at(k, fan[1]), self.at(k, fan[2]));
+        let (f1, f_last) = (self.at(k, fan[3]), self.at(k, fan[fan.len() - 1]));
+        let (p1, p2, p3, p4) = (self.at(k, outer[0]), self.at(k, outer[1]), self.at(k, outer[2]), self.at(k, outer[3]));
+        let (p5, p6, p7) = (self.at(k, outer[4]), self.at(k, outer[5]), self.at(k, outer[6]));
+        let (face_0, face_1) = (k.load4(&refined_fan[1].0), k.load4(&refined_fan[3].0));
+        let face_last = k.load4(&refined_fan[fan.len() - 1].0);
         let below = mean(k, e0, f_last, p1, p2);
         let right = mean(k, e0, f0, p2, p3);
         let corner = mean(k, f0, p3, p4, p5);
         let above = mean(k, f0, e1, p5, p6);
         let left = mean(k, e1, f1, p6, p7);
-        self.set(k, outer, mean(k, e0, f_last, face_last, below));
-        self.set(k, outer + 1, vertex_point(k, e0, [apex, p2, f0, f_last], [face_0, face_last, below, right]));
-        self.set(k, outer + 2, mean(k, e0, f0, face_0, right));
-        self.set(k, outer + 3, vertex_point(k, f0, [e0, e1, p3, p5], [face_0, right, corner, above]));
-        self.set(k, outer + 4, mean(k, e1, f0, face_0, above));
-        self.set(k, outer + 5, vertex_point(k, e1, [apex, f0, p6, f1], [face_0, above, left, face_1]));
-        self.set(k, outer + 6, mean(k, e1, f1, face_1, left));
-        let beyond = outer + N_OUTER;
-        self.set(k, beyond, below);
-        self.set(k, beyond + 1, mean(k, e0, p2, below, right));
-        self.set(k, beyond + 2, right);
-        self.set(k, beyond + 3, mean(k, f0, p3, right, corner));
-        self.set(k, beyond + 4, corner);
-        self.set(k, beyond + 5, mean(k, f0, p5, corner, above));
-        self.set(k, beyond + 6, above);
-        self.set(k, beyond + 7, mean(k, e1, p6, above, left));
-        self.set(k, beyond + 8, left);
+        out[0].0 = k.store4(mean(k, e0, f_last, face_last, below));
+        out[1].0 = k.store4(vertex_point(k, e0, [apex, p2, f0, f_last], [face_0, face_last, below, right]));
+        out[2].0 = k.store4(mean(k, e0, f0, face_0, right));
+        out[3].0 = k.store4(vertex_point(k, f0, [e0, e1, p3, p5], [face_0, right, corner, above]));
+        out[4].0 = k.store4(mean(k, e1, f0, face_0, above));
+        out[5].0 = k.store4(vertex_point(k, e1, [apex, f0, p6, f1], [face_0, above, left, face_1]));
+        out[6].0 = k.store4(mean(k, e1, f1, face_1, left));
+        out[7].0 = k.store4(below);
+        out[8].0 = k.store4(mean(k, e0, p2, below, right));
+        out[9].0 = k.store4(right);
+        out[10].0 = k.store4(mean(k, f0, p3, right, corner));
+        out[11].0 = k.store4(corner);
+        out[12].0 = k.store4(mean(k, f0, p5, corner, above));
+        out[13].0 = k.store4(above);
+        out[14].0 = k.store4(mean(k, e1, p6, above, left));
+        out[15].0 = k.store4(left);
     }
 }
 
@@ -193,10 +192,14 @@ impl<I: Index> Task for PoleStep<'_, I> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(mut self, k: K) {
-        let n = (self.ring.len() - 1 - N_OUTER) / 2;
         assert_eq!(self.out.len(), self.ring.len() + N_BEYOND, "a pole's refined points");
-        self.fan(k, n);
-        self.outside(k, n);
+        let out = std::mem::take(&mut self.out);
+        let (out, out_outside) = out.split_last_chunk_mut().expect("more than are outside");
+        let (out_apex, out_fan) = out.split_first_mut().expect("an apex");
+        let fan = &self.ring[1..self.ring.len() - N_OUTER];
+        let apex = self.at(k, self.ring[0]);
+        out_apex.0 = k.store4(self.refine_fan(k, apex, fan, out_fan));
+        self.refine_outside(k, apex, fan, out_fan, out_outside);
     }
 }
 
@@ -228,27 +231,75 @@ pub(super) struct PoleHull<'a, I> {
     pub scratch: &'a mut [[Point; MOST_REFINED]; 2],
 }
 
-/// The control points of the regular quarters among the refined points of a pole with `n` faces around its apex.
+/// The points of the regular quarters of a pole's face in rows, of its refined points: those of the apex's side below
+/// the face, [x] from 0, and those from there on, [y][x] with x from -1.
 #[inline(always)]
+fn rows_of_quarters<T>(refined: &[T]) -> ([&T; 4], [[&T; 5]; 4]) {
+    let (inner, outside) = refined.split_last_chunk::<N_OUTSIDE>().expect("a pole's refined points");
+    let (first, last) = (inner.first_chunk::<6>(), inner.last_chunk::<2>());
+    let (f, l, o) = (first.expect("two faces"), last.expect("two faces"), outside);
+    let rows = [
+        [&f[5], &f[0], &f[1], &o[1], &o[8]],
+        [&f[4], &f[3], &f[2], &o[2], &o[9]],
+        [&o[6], &o[5], &o[4], &o[3], &o[10]],
+        [&o[15], &o[14], &o[13], &o[12], &o[11]],
+    ];
+    ([&l[0], &l[1], &o[0], &o[7]], rows)
+}
+
+/// The control points of the regular quarters among the refined points of a pole with `n` faces around its apex.
 pub(super) fn regular_quarters(n: usize) -> [[usize; 16]; 3] {
-    let (outer, beyond) = (1 + 2 * n, 1 + 2 * n + N_OUTER);
-    let below = [2 * n - 1, 2 * n, outer, beyond];
-    let row_0 = [5, 0, 1, outer + 1, beyond + 1];
-    let row_1 = [4, 3, 2, outer + 2, beyond + 2];
-    let row_2 = [outer + 6, outer + 5, outer + 4, outer + 3, beyond + 3];
-    let row_3 = [beyond + 8, beyond + 7, beyond + 6, beyond + 5, beyond + 4];
-    let right = |row: [usize; 5]| [row[1], row[2], row[3], row[4]];
-    let left = |row: [usize; 5]| [row[0], row[1], row[2], row[3]];
+    let all: Vec<usize> = (0..1 + 2 * n + N_OUTSIDE).collect();
+    let (below, rows) = rows_of_quarters(&all);
     [
-        joined([below, right(row_0), right(row_1), right(row_2)]),
-        joined([right(row_0), right(row_1), right(row_2), right(row_3)]),
-        joined([left(row_0), left(row_1), left(row_2), left(row_3)]),
+        joined([below, last_four(rows[0]), last_four(rows[1]), last_four(rows[2])]),
+        joined(rows.map(last_four)),
+        joined(rows.map(first_four)),
     ]
 }
 
+fn first_four([a, b, c, d, _]: [&usize; 5]) -> [&usize; 4] {
+    [a, b, c, d]
+}
+
+fn last_four([_, a, b, c, d]: [&usize; 5]) -> [&usize; 4] {
+    [a, b, c, d]
+}
+
+fn joined(rows: [[&usize; 4]; 4]) -> [usize; 16] {
+    std::array::from_fn(|i| *rows[i / 4][i % 4])
+}
+
+/// The box of the Bézier points of a pole's regular quarters: quarters side by side have some in common, and all but
+/// the first of a row or a column of theirs.
 #[inline(always)]
-fn joined(rows: [[usize; 4]; 4]) -> [usize; 16] {
-    std::array::from_fn(|i| rows[i / 4][i % 4])
+fn hull_of_quarters<K: Kernel>(k: K, refined: &[Point]) -> (K::D, K::D) {
+    let (below, rows) = rows_of_quarters(refined);
+    let nothing = k.splat4(0.0);
+    // Up one column: three points of the lower right quarter, then four of the upper ones.
+    let mut right = [[nothing; 4]; 7];
+    for x in 0..4 {
+        let c = [below[x], rows[0][x + 1], rows[1][x + 1], rows[2][x + 1], rows[3][x + 1]];
+        let c = [k.load4(&c[0].0), k.load4(&c[1].0), k.load4(&c[2].0), k.load4(&c[3].0), k.load4(&c[4].0)];
+        for (row, p) in right.iter_mut().zip(bezier_points_of_two(k, c)) {
+            row[x] = p;
+        }
+    }
+    let c = [k.load4(&rows[0][0].0), k.load4(&rows[1][0].0), k.load4(&rows[2][0].0), k.load4(&rows[3][0].0)];
+    let left = bezier_points(k, c);
+    let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
+    for row in &right[..3] {
+        for p in bezier_points(k, *row) {
+            (low, high) = (k.min4(low, p), k.max4(high, p));
+        }
+    }
+    for (first, [a, b, c, d]) in left.into_iter().zip(&right[3..]) {
+        for p in bezier_points_of_two(k, [first, *a, *b, *c, *d]) {
+            (low, high) = (k.min4(low, p), k.max4(high, p));
+        }
+    }
+    let scale = k.splat4(1.0 / 36.0);
+    (k.mul4(low, scale), k.mul4(high, scale))
 }
 
 /// The box of some points, grown.
@@ -265,7 +316,6 @@ impl<I: Index> Task for PoleHull<'_, I> {
     #[inline(always)]
     fn run<K: Kernel>(self, k: K) -> [Point; 2] {
         let (n_ring, n_refined) = (self.ring.len(), self.ring.len() + N_BEYOND);
-        let quarters = regular_quarters((n_ring - 1 - N_OUTER) / 2);
         let [mut refined, mut before] = self.scratch.each_mut();
         let (mut low, mut high) = (k.splat4(f64::INFINITY), k.splat4(f64::NEG_INFINITY));
         for level in 0..self.depth {
@@ -279,15 +329,8 @@ impl<I: Index> Task for PoleHull<'_, I> {
                 // What these points reach beyond the last quarter lies in the others of the level before.
                 grow_by_points(k, &refined[..n_refined], &mut low, &mut high);
             } else {
-                for quarter in &quarters {
-                    let mut control = [k.splat4(0.0); 16];
-                    for (lanes, &i) in control.iter_mut().zip(quarter) {
-                        *lanes = k.load4(&refined[i].0);
-                    }
-                    let (l, h) = whole_hull(k, &control);
-                    let scale = k.splat4(1.0 / 36.0);
-                    (low, high) = (k.min4(low, k.mul4(l, scale)), k.max4(high, k.mul4(h, scale)));
-                }
+                let (l, h) = hull_of_quarters(k, &refined[..n_refined]);
+                (low, high) = (k.min4(low, l), k.max4(high, h));
                 if self.depth == 1 {
                     grow_by_points(k, &refined[..n_ring], &mut low, &mut high);
                 }

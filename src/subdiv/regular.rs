@@ -289,7 +289,7 @@ pub(super) struct WholeHull<'a> {
 
 /// Six times the Bézier points of a segment.
 #[inline(always)]
-fn bezier_points<K: Kernel>(k: K, c: [K::D; 4]) -> [K::D; 4] {
+pub(super) fn bezier_points<K: Kernel>(k: K, c: [K::D; 4]) -> [K::D; 4] {
     let (twice_1, twice_2) = (k.add4(c[1], c[1]), k.add4(c[2], c[2]));
     let (inner_1, inner_2) = (k.add4(twice_1, c[2]), k.add4(c[1], twice_2));
     [
@@ -300,9 +300,17 @@ fn bezier_points<K: Kernel>(k: K, c: [K::D; 4]) -> [K::D; 4] {
     ]
 }
 
+/// As [`bezier_points`] of two segments side by side: the last one of the first is the first one of the second.
+#[inline(always)]
+pub(super) fn bezier_points_of_two<K: Kernel>(k: K, c: [K::D; 5]) -> [K::D; 7] {
+    let [p0, p1, p2, p3] = bezier_points(k, [c[0], c[1], c[2], c[3]]);
+    let [_, p4, p5, p6] = bezier_points(k, [c[1], c[2], c[3], c[4]]);
+    [p0, p1, p2, p3, p4, p5, p6]
+}
+
 /// The lowest and the highest of 36 times the Bézier points of a patch.
 #[inline(always)]
-pub(super) fn whole_hull<K: Kernel>(k: K, c: &[K::D; 16]) -> (K::D, K::D) {
+fn whole_hull<K: Kernel>(k: K, c: &[K::D; 16]) -> (K::D, K::D) {
     let mut rows = [[k.splat4(0.0); 4]; 4];
     for i in 0..4 {
         let column = bezier_points(k, [c[i], c[4 + i], c[8 + i], c[12 + i]]);
