@@ -20,7 +20,7 @@ use super::parts::divide;
 use super::{EMPTY, LANES, LEAF, NodeBoxes, Nodes, Plates, TopLevel};
 use crate::math::Bounds;
 use crate::parallel::for_each;
-use glam::{Vec3, Vec3A};
+use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -207,13 +207,9 @@ impl Assembly {
     }
 }
 
-fn aabb(b: &Bounds) -> Aabb {
-    Aabb::new(Vec3A::from(b.min), Vec3A::from(b.max))
-}
-
 /// The boxes of groups, each moved and widened by amounts that depend on its place.
 fn without_ties(groups: &[Group]) -> Vec<Aabb> {
-    let all = groups.iter().map(|g| g.bounds).fold(Bounds::EMPTY, Bounds::union);
+    let all = groups.iter().fold(Aabb::INVALID, |all, g| all.union(&g.bounds));
     let size = all.max - all.min;
     let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).expect("three axes");
     let changed = |(i, group): (usize, &Group)| {
@@ -222,10 +218,10 @@ fn without_ties(groups: &[Group]) -> Vec<Aabb> {
             let mixed = (i as u32 ^ salt).wrapping_mul(0x9e37_79b9).rotate_left(15).wrapping_mul(0x85eb_ca6b);
             (mixed >> 8) as f32 / (1 << 24) as f32
         };
-        let mut by = Vec3::ZERO;
+        let mut by = Vec3A::ZERO;
         by[axis] = ((b.max - b.min)[axis] * JITTER + JITTER_STEPS) * (random(1) - 0.5);
         let wider = (WIDENING_STEPS * random(0x5bd1_e995)).ceil();
-        Aabb::new(Vec3A::from(b.min + by - wider), Vec3A::from(b.max + by + wider))
+        Aabb::new(b.min + by - wider, b.max + by + wider)
     };
     groups.iter().enumerate().map(changed).collect()
 }
@@ -237,7 +233,7 @@ fn restore_boxes(binary: &mut Bvh2, order: &[u32], groups: &[Group]) {
         let first = node.first_index as usize;
         let of = |i: usize| *binary.nodes[i].aabb();
         let below = if node.is_leaf() {
-            aabb(&groups[binary.primitive_indices[first] as usize].bounds)
+            groups[binary.primitive_indices[first] as usize].bounds
         } else {
             of(first).union(&of(first + 1))
         };

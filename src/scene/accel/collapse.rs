@@ -2,7 +2,7 @@
 //! Karras, Laine: "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, section 3.1).
 
 use super::LANES;
-use super::groups::{Group, half_area};
+use super::groups::{Group, aabb, half_area};
 use crate::math::Bounds;
 use obvhs::bvh2::Bvh2;
 
@@ -44,7 +44,7 @@ impl<'t> Collapse<'t> {
             let first = node.first_index as usize;
             plans[n as usize] = if node.is_leaf() {
                 let group = &groups[tree.primitive_indices[first] as usize];
-                let area_of = |&number: &u32| half_area(&boxes[number as usize]);
+                let area_of = |&number: &u32| half_area(&aabb(&boxes[number as usize]));
                 Plan::of_group(area, group.numbers().len(), group.numbers().iter().map(area_of).sum())
             } else {
                 Plan::of_inner(area, &plans[first], &plans[first + 1])

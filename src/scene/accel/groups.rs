@@ -7,7 +7,8 @@
 use super::LANES;
 use super::build::Care;
 use crate::math::Bounds;
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
+use obvhs::aabb::Aabb;
 
 /// Boxes of which all three orders are compared; of more, slabs along one axis or all are.
 const MOST_SORTED: usize = 32;
@@ -21,13 +22,13 @@ const LEAST_SHARE: usize = 8;
 /// A box to be grouped, and its number.
 #[derive(Clone, Copy)]
 struct Item {
-    bounds: Bounds,
+    bounds: Aabb,
     number: u32,
 }
 
 impl Item {
     /// Twice the centre, which is as good for comparisons.
-    fn center(&self) -> Vec3 {
+    fn center(&self) -> Vec3A {
         self.bounds.min + self.bounds.max
     }
 }
@@ -35,7 +36,7 @@ impl Item {
 /// Up to eight boxes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Group {
-    pub bounds: Bounds,
+    pub bounds: Aabb,
     /// Numbers of the boxes, the first `len` of these.
     numbers: [u32; LANES],
     len: usize,
@@ -49,7 +50,8 @@ impl Group {
 
 /// The groups of some of `boxes`.
 pub(super) fn groups(boxes: &[Bounds], members: &[u32], care: Care) -> Vec<Group> {
-    let mut items: Vec<Item> = members.iter().map(|&number| Item { bounds: boxes[number as usize], number }).collect();
+    let mut items: Vec<Item> =
+        members.iter().map(|&number| Item { bounds: aabb(&boxes[number as usize]), number }).collect();
     let mut groups = Vec::with_capacity(items.len().div_ceil(LANES));
     divide(&mut items, care, &mut groups);
     groups
@@ -68,12 +70,18 @@ fn divide(items: &mut [Item], care: Care, groups: &mut Vec<Group>) {
     divide(high, care, groups);
 }
 
-fn union(items: &[Item]) -> Bounds {
-    items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds))
+/// In vectors of four lanes, which groups are found faster with.
+pub(super) fn aabb(b: &Bounds) -> Aabb {
+    Aabb::new(Vec3A::from(b.min), Vec3A::from(b.max))
 }
 
-pub(super) fn half_area(b: &Bounds) -> f32 {
-    let size = (b.max - b.min).max(Vec3::ZERO);
+fn union(items: &[Item]) -> Aabb {
+    items.iter().fold(Aabb::INVALID, |all, item| all.union(&item.bounds))
+}
+
+/// Half the surface; 0 of [`Aabb::INVALID`].
+pub(super) fn half_area(b: &Aabb) -> f32 {
+    let size = Vec3::from((b.max - b.min).max(Vec3A::ZERO));
     size.x * size.y + size.y * size.z + size.z * size.x
 }
 
@@ -120,15 +128,15 @@ impl Order {
 fn cheapest(items: &[Item], order: &Order) -> (f32, usize) {
     let n = items.len();
     let mut above = [0.0; MOST_SORTED];
-    let mut bounds = Bounds::EMPTY;
+    let mut bounds = Aabb::INVALID;
     for (i, place) in order.places().enumerate().rev() {
-        bounds = bounds.union(items[place].bounds);
+        bounds = bounds.union(&items[place].bounds);
         above[i] = half_area(&bounds);
     }
-    bounds = Bounds::EMPTY;
+    bounds = Aabb::INVALID;
     let mut best = (f32::INFINITY, LANES);
     for (middle, place) in (1..n).zip(order.places()) {
-        bounds = bounds.union(items[place].bounds);
+        bounds = bounds.union(&items[place].bounds);
         if middle.is_multiple_of(LANES) || (n - middle).is_multiple_of(LANES) {
             let n_nodes = |n: usize| n.div_ceil(LANES) as f32;
             let cost = half_area(&bounds) * n_nodes(middle) + above[middle] * n_nodes(n - middle);
@@ -143,17 +151,15 @@ fn cheapest(items: &[Item], order: &Order) -> (f32, usize) {
 /// Puts the items below the cheapest slab boundary first, or rather a multiple of eight.
 fn split_slabs(items: &mut [Item], care: Care) -> usize {
     let n = items.len();
-    let (low, high) = items.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), item| {
+    let (low, high) = items.iter().fold((Vec3A::INFINITY, Vec3A::NEG_INFINITY), |(low, high), item| {
         (low.min(item.center()), high.max(item.center()))
     });
     let extent = high - low;
     let longest = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).expect("three axes");
     let axes = if care == Care::Thorough { 0..3 } else { longest..longest + 1 };
-    let boundary = |axis: usize| {
-        let scale = N_BINS as f32 / extent[axis].max(f32::MIN_POSITIVE);
-        let bin = |item: &Item| (((item.center()[axis] - low[axis]) * scale) as usize).min(N_BINS - 1);
-        best_boundary(items, bin).map(|(cost, near)| (cost, axis, near))
-    };
+    let scale = Vec3A::splat(N_BINS as f32) / extent.max(Vec3A::splat(f32::MIN_POSITIVE));
+    let slabs = slabs(items, low, scale, axes.clone());
+    let boundary = |axis: usize| best_boundary(&slabs[axis], n).map(|(cost, near)| (cost, axis, near));
     let best = axes.filter_map(boundary).min_by(|a, b| a.0.total_cmp(&b.0));
     let (_, axis, near) = best.unwrap_or((0.0, longest, n / 2));
     let least = n / LEAST_SHARE;
@@ -164,27 +170,57 @@ fn split_slabs(items: &mut [Item], care: Care) -> usize {
     middle
 }
 
-/// The cost of the cheapest boundary between slabs, and how many items are below it, if there is any.
-fn best_boundary(items: &[Item], bin: impl Fn(&Item) -> usize) -> Option<(f32, usize)> {
-    let mut slabs = [(Bounds::EMPTY, 0usize); N_BINS];
+/// What lies in each of [`N_BINS`] slabs along an axis.
+type Slabs = [Slab; N_BINS];
+
+#[derive(Clone, Copy)]
+struct Slab {
+    bounds: Aabb,
+    n_items: usize,
+}
+
+impl Slab {
+    const EMPTY: Self = Self { bounds: Aabb::INVALID, n_items: 0 };
+
+    fn union(&self, other: &Self) -> Self {
+        Self { bounds: self.bounds.union(&other.bounds), n_items: self.n_items + other.n_items }
+    }
+
+    fn cost(&self) -> f32 {
+        half_area(&self.bounds) * self.n_items as f32
+    }
+}
+
+/// The slabs along some axes, by the centres of items: all in one pass.
+fn slabs(items: &[Item], low: Vec3A, scale: Vec3A, axes: std::ops::Range<usize>) -> [Slabs; 3] {
+    let mut slabs = [[Slab::EMPTY; N_BINS]; 3];
     for item in items {
-        let slab = &mut slabs[bin(item)];
-        *slab = (slab.0.union(item.bounds), slab.1 + 1);
+        let bins = ((item.center() - low) * scale).as_uvec3();
+        for axis in axes.clone() {
+            let slab = &mut slabs[axis][(bins[axis] as usize).min(N_BINS - 1)];
+            slab.bounds = slab.bounds.union(&item.bounds);
+            slab.n_items += 1;
+        }
     }
+    slabs
+}
+
+/// The cost of the cheapest boundary between slabs of `n_items` items, and how many are below it, if there is any.
+fn best_boundary(slabs: &Slabs, n_items: usize) -> Option<(f32, usize)> {
     let mut above = [0.0; N_BINS];
-    let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-    for (i, slab) in slabs.iter().enumerate().rev() {
-        (bounds, count) = (bounds.union(slab.0), count + slab.1);
-        above[i] = half_area(&bounds) * count as f32;
+    let mut all = Slab::EMPTY;
+    for (above, slab) in above.iter_mut().zip(slabs).rev() {
+        all = all.union(slab);
+        *above = all.cost();
     }
-    (bounds, count) = (Bounds::EMPTY, 0);
+    let mut below = Slab::EMPTY;
     let mut best = None;
     let mut least = f32::INFINITY;
-    for boundary in 1..N_BINS {
-        (bounds, count) = (bounds.union(slabs[boundary - 1].0), count + slabs[boundary - 1].1);
-        let cost = half_area(&bounds) * count as f32 + above[boundary];
-        if count > 0 && count < items.len() && cost < least {
-            (least, best) = (cost, Some((cost, count)));
+    for (slab, above) in slabs.iter().zip(&above[1..]) {
+        below = below.union(slab);
+        let cost = below.cost() + above;
+        if below.n_items > 0 && below.n_items < n_items && cost < least {
+            (least, best) = (cost, Some((cost, below.n_items)));
         }
     }
     best
