@@ -12,6 +12,10 @@
 //! edition comes twice (in 2^31 writes): a sequence lock (Boehm, "Can seqlocks get along with programming language
 //! memory models?", MSPC 2012) whose sequence is the label. Nobody waits: who finds an entry busy goes without.
 
+#![allow(unsafe_code)]
+
+#[cfg(not(loom))]
+use super::memory::{Memory, lines_for};
 use super::sync::{AtomicU64, Ordering, fence};
 
 /// Set in the labels of known entries.
@@ -26,7 +30,7 @@ const BUSY: u64 = u64::MAX;
 /// A table of so many words for each of some numbers.
 pub struct MemoTable<const WORDS: usize> {
     /// A power of two of them, or none.
-    entries: Box<[Entry<WORDS>]>,
+    entries: Entries<WORDS>,
     /// A bit for each of them, set when something is known there for the first time: these lie closer together than
     /// labels.
     marks: Box<[AtomicU64]>,
@@ -63,13 +67,12 @@ impl<const WORDS: usize> Known<'_, WORDS> {
 }
 
 impl<const WORDS: usize> MemoTable<WORDS> {
-    /// A table of so many entries, rounded up to a power of two.
+    /// A table of so many entries, rounded up to a power of two. They take memory when something is asked about them.
     pub fn new(n_entries: usize) -> Self {
         let zero = || AtomicU64::new(0);
-        let entry = |_| Entry { label: zero(), words: std::array::from_fn(|_| zero()) };
-        let n = rounded_up(n_entries);
-        let marks = (0..n.div_ceil(MARKS)).map(|_| zero()).collect();
-        Self { entries: (0..n).map(entry).collect(), marks, n_editions: zero() }
+        let entries = Entries::new(rounded_up(n_entries));
+        let marks = (0..entries.len().div_ceil(MARKS)).map(|_| zero()).collect();
+        Self { entries, marks, n_editions: zero() }
     }
 
     /// Bytes of a table of so many entries.
@@ -159,6 +162,61 @@ impl<const WORDS: usize> MemoTable<WORDS> {
         entry.label.store(label_of(number, KNOWN | edition), Ordering::Release);
         let place = self.place(number);
         self.marks[place / MARKS].fetch_or(1 << (place % MARKS), Ordering::Relaxed);
+    }
+}
+
+/// Entries of zeroes. Of most tables few are ever used, and what is not is never resident: written in advance, those of
+/// the [departures](crate::scene) of a mesh of eight thousand patches or more are 5 MiB, of whose pages each costs as
+/// much as a block.
+#[cfg(not(loom))]
+struct Entries<const WORDS: usize> {
+    memory: Memory,
+    len: usize,
+}
+
+#[cfg(not(loom))]
+impl<const WORDS: usize> Entries<WORDS> {
+    /// So many, or none if the system refuses: nothing is remembered then.
+    fn new(len: usize) -> Self {
+        let bytes = len.checked_mul(size_of::<Entry<WORDS>>());
+        match bytes.and_then(|bytes| Memory::zeroed(lines_for(bytes))) {
+            Some(memory) => Self { memory, len },
+            None => Self { memory: Memory::nothing(), len: 0 },
+        }
+    }
+}
+
+#[cfg(not(loom))]
+impl<const WORDS: usize> std::ops::Deref for Entries<WORDS> {
+    type Target = [Entry<WORDS>];
+
+    #[inline(always)]
+    fn deref(&self) -> &[Entry<WORDS>] {
+        const { assert!(align_of::<Entry<WORDS>>() <= super::memory::LINE) };
+        // SAFETY: the memory is aligned to lines and has room for so many entries, for as long as `self` lives. It was
+        // zero, which is an entry, since entries are atomics and nothing else, and is reached through this slice alone.
+        unsafe { std::slice::from_raw_parts(self.memory.start().cast(), self.len) }
+    }
+}
+
+/// loom's atomics are more than their value.
+#[cfg(loom)]
+struct Entries<const WORDS: usize>(Box<[Entry<WORDS>]>);
+
+#[cfg(loom)]
+impl<const WORDS: usize> Entries<WORDS> {
+    fn new(len: usize) -> Self {
+        let zero = || AtomicU64::new(0);
+        Self((0..len).map(|_| Entry { label: zero(), words: std::array::from_fn(|_| zero()) }).collect())
+    }
+}
+
+#[cfg(loom)]
+impl<const WORDS: usize> std::ops::Deref for Entries<WORDS> {
+    type Target = [Entry<WORDS>];
+
+    fn deref(&self) -> &[Entry<WORDS>] {
+        &self.0
     }
 }
 

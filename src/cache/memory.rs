@@ -12,6 +12,10 @@ pub(super) const fn lines_for(bytes: usize) -> usize {
     bytes.div_ceil(LINE)
 }
 
+/// What a line is aligned to.
+#[repr(align(64))]
+struct Aligned;
+
 /// Zeroed lines owned by this value and reached through raw pointers only, so that parts of it can be lent out
 /// separately.
 pub(super) struct Memory {
@@ -31,7 +35,7 @@ impl Memory {
     /// which would make every page resident at once.
     pub(super) fn zeroed(lines: usize) -> Option<Self> {
         if lines == 0 {
-            return Some(Self { allocation: None, first_line: NonNull::dangling() });
+            return Some(Self::nothing());
         }
         let layout = Layout::from_size_align(lines.checked_add(1)?.checked_mul(LINE)?, 16).ok()?;
         // SAFETY: the size is not zero.
@@ -42,10 +46,21 @@ impl Memory {
         Some(Self { allocation: Some((start, layout)), first_line })
     }
 
+    /// No line at all.
+    pub(super) fn nothing() -> Self {
+        Self { allocation: None, first_line: NonNull::<[Aligned; 0]>::dangling().cast() }
+    }
+
     /// Whether an address lies in the allocation.
     pub(super) fn holds(&self, address: usize) -> bool {
         self.allocation
             .is_some_and(|(start, layout)| (start.addr().get()..start.addr().get() + layout.size()).contains(&address))
+    }
+
+    /// The address of the first line, 64-byte aligned even if there is none.
+    #[inline(always)]
+    pub(super) fn start(&self) -> *mut u8 {
+        self.first_line.as_ptr()
     }
 
     /// The address of line `idx`, 64-byte aligned.
