@@ -7,6 +7,13 @@ use std::ptr::NonNull;
 /// Bytes of a cache line, the unit in which blocks are placed.
 pub(super) const LINE: usize = 64;
 
+/// Bytes of a large page. What asks for several starts at one: the memory before the first would become resident by
+/// small ones, 475 page faults of trex's first frame.
+const HUGE_PAGE: usize = 2 << 20;
+
+/// Large pages that memory has room for if it asks for them: fewer might make much more memory resident than is used.
+const LEAST_HUGE_PAGES: usize = 8;
+
 /// Lines that hold `bytes` bytes.
 pub(super) const fn lines_for(bytes: usize) -> usize {
     bytes.div_ceil(LINE)
@@ -37,12 +44,17 @@ impl Memory {
         if lines == 0 {
             return Some(Self::nothing());
         }
-        let layout = Layout::from_size_align(lines.checked_add(1)?.checked_mul(LINE)?, 16).ok()?;
+        let bytes = lines.checked_mul(LINE)?;
+        let is_large = bytes >= LEAST_HUGE_PAGES * HUGE_PAGE;
+        let align = if is_large { HUGE_PAGE } else { LINE };
+        let layout = Layout::from_size_align(bytes.checked_add(align)?, 16).ok()?;
         // SAFETY: the size is not zero.
         let start = NonNull::new(unsafe { alloc_zeroed(layout) })?;
-        // SAFETY: at most LINE - 1 bytes further, and the allocation has LINE bytes more than `lines` lines.
-        let first_line = unsafe { start.add(start.align_offset(LINE)) };
-        prefer_huge_pages(first_line, lines * LINE);
+        // SAFETY: at most `align` - 1 bytes further, and the allocation has `align` bytes more than `lines` lines.
+        let first_line = unsafe { start.add(start.align_offset(align)) };
+        if is_large {
+            prefer_huge_pages(first_line, bytes);
+        }
         Some(Self { allocation: Some((start, layout)), first_line })
     }
 
@@ -83,17 +95,11 @@ impl Drop for Memory {
     }
 }
 
-/// Asks for 2 MiB pages where that cannot make much more memory resident than is used: random blocks then miss the TLB
-/// less often. A refusal changes nothing but speed.
+/// Asks for large pages, so that random blocks miss the TLB less often. A refusal changes nothing but speed.
 #[cfg(all(target_os = "linux", not(miri)))]
 fn prefer_huge_pages(start: NonNull<u8>, bytes: usize) {
-    const HUGE_PAGE: usize = 2 << 20;
-    let skipped = start.align_offset(HUGE_PAGE);
-    if skipped < bytes && bytes - skipped >= 8 * HUGE_PAGE {
-        let whole_pages = (bytes - skipped) / HUGE_PAGE * HUGE_PAGE;
-        // SAFETY: whole pages inside our allocation; the advice does not change their contents.
-        unsafe { libc::madvise(start.add(skipped).as_ptr().cast(), whole_pages, libc::MADV_HUGEPAGE) };
-    }
+    // SAFETY: whole pages inside our allocation; the advice does not change their contents.
+    unsafe { libc::madvise(start.as_ptr().cast(), bytes / HUGE_PAGE * HUGE_PAGE, libc::MADV_HUGEPAGE) };
 }
 
 #[cfg(not(all(target_os = "linux", not(miri))))]
