@@ -74,7 +74,11 @@ impl Care {
             Self::Hasty => BvhBuildParams::very_fast_build(),
             Self::Thorough => BvhBuildParams::very_slow_build(),
         };
-        BvhBuildParams { max_prims_per_leaf: 1, ..parameters }
+        // Nodes are put in their places once. A second time is meant for trees whose leaves were joined in between, as
+        // none are here: it takes 4 % of the instructions of preparing trex and spares rays 0.0 to 0.4 % of what they
+        // look up (trex, bigguy, monsterfrog, rates 8 and 16; bishop at 8 looks up 0.2 % more).
+        let once = BvhBuildParams { post_collapse_reinsertion_batch_ratio_multiplier: 0.0, ..parameters };
+        BvhBuildParams { max_prims_per_leaf: 1, ..once }
     }
 }
 
