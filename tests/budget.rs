@@ -58,6 +58,21 @@ fn named_by(refusal: &str) -> String {
     size.to_owned()
 }
 
+/// The first budget that is accepted if what a refusal names is tried next, and the number of refusals: what plans take
+/// is known only when they are made, so that the size named first may be refused in its turn.
+fn first_accepted(budget: &str, render: impl Fn(&str) -> assert_cmd::assert::Assert) -> (String, usize) {
+    let mut named = budget.to_owned();
+    for n_refusals in 0..10 {
+        let output = render(&named).get_output().clone();
+        if output.status.success() {
+            return (named, n_refusals);
+        }
+        assert_eq!(output.status.code(), Some(2));
+        named = named_by(&String::from_utf8(output.stderr).unwrap());
+    }
+    panic!("{named} is refused like nine before it")
+}
+
 #[test]
 fn too_small_a_budget_is_refused_with_one_that_does() {
     let folder = folder_with_ground("40k");
@@ -73,6 +88,22 @@ fn too_small_a_budget_is_refused_with_one_that_does() {
     assert!(refused("1M").contains("of the file fill it; all of it takes"));
 }
 
+/// Layers are what such a picture's memory goes to, and encoders have a part of them in several forms.
+#[test]
+fn writing_all_layers_is_within_the_smallest_budget() {
+    let folder = folder_with_ground("1k");
+    let layers = "Z,N,mesh,patch,uv,samples,miss,build,group,reason,error";
+    let options = ["render", "ground.obj", "-o", "g.exr", "--size", "800x600", "--spp", "1", "--aov", layers];
+    let render = |budget: &str| {
+        lazytess(folder.path(), &[&options[..], &["--quiet", "--stats", "s.json", "--memory", budget]].concat())
+    };
+    let (named, _) = first_accepted("4M", render);
+    let statistics: Value = serde_json::from_slice(&std::fs::read(folder.path().join("s.json")).unwrap()).unwrap();
+    let (budget, film) = (named.trim_end_matches('M').parse::<f64>().unwrap() * f64::from(1 << 20), 480e3 * 65.0);
+    let peak = statistics["memory"]["peak_resident_bytes"].as_f64().unwrap();
+    assert!(peak <= 1.05 * budget && budget < 2.5 * film, "{peak} of {budget}");
+}
+
 #[test]
 fn plans_and_large_rings_are_within_the_budget_too() {
     let folder = tempfile::tempdir().unwrap();
@@ -83,18 +114,7 @@ fn plans_and_large_rings_are_within_the_budget_too() {
             let options = ["render", mesh, "-o", "m.png", "--size", "60x40", "--threads", "2", "--quiet"];
             lazytess(folder.path(), &[&options[..], &["--stats", "m.json", "--memory", budget]].concat())
         };
-        // What plans take is known only when they are made: the size named first may be refused in its turn.
-        let mut named = "16M".to_owned();
-        let mut n_refusals = 0;
-        loop {
-            let output = render(&named).get_output().clone();
-            if output.status.success() {
-                break;
-            }
-            assert_eq!(output.status.code(), Some(2));
-            named = named_by(&String::from_utf8(output.stderr).unwrap());
-            n_refusals += 1;
-        }
+        let (named, n_refusals) = first_accepted("16M", render);
         assert!((1..4).contains(&n_refusals), "{mesh}: {n_refusals} refusals");
         let statistics: Value = serde_json::from_slice(&std::fs::read(folder.path().join("m.json")).unwrap()).unwrap();
         let budget = named.trim_end_matches('M').parse::<f64>().unwrap() * f64::from(1 << 20);

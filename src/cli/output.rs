@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::image::color_map::viridis;
 use crate::image::display::{display_pixels, display_value};
 use crate::io::exr::write_exr;
-use crate::io::picture::{ChannelData, ImageLayers, Layer};
+use crate::io::picture::{Channels, Samples};
 use crate::io::png::write_png;
 use crate::render::film::{Aov, Film, PlaneData};
 use crate::render::groups::NO_GROUP;
@@ -33,7 +33,7 @@ const REASON_COLORS: [[f32; 3]; 13] = [
 /// Writes the film of a picture of that size whole, or leaves the file that was there.
 pub fn write_film(path: &Path, format: PictureFormat, film: &Film, size: [u32; 2]) -> Result<()> {
     match format {
-        PictureFormat::Exr => write_exr(path, &layers(film, size)),
+        PictureFormat::Exr => write_exr(path, &channels(film, size)),
         PictureFormat::Png => {
             write_png(path, film.window().width() as usize, display_pixels(film.colors()))?;
             film.planes().iter().try_for_each(|(aov, plane)| write_plane(path, film, *aov, plane))
@@ -54,13 +54,14 @@ pub fn is_drawn(aov: Aov) -> bool {
 
 /// `picture.png` gets `picture.group.png` beside it.
 fn write_plane(path: &Path, film: &Film, aov: Aov, plane: &PlaneData) -> Result<()> {
-    let pixels: Vec<[f32; 3]> = match plane {
-        PlaneData::Id(ids) if aov == Aov::Group => ids.iter().map(|&id| group_color(id)).collect(),
-        PlaneData::Id(ids) => ids.iter().map(|&id| REASON_COLORS[id as usize % REASON_COLORS.len()]).collect(),
-        PlaneData::Float(channels) => error_colors(&channels[0]),
-    };
-    let name = aov.channels().1[0];
-    write_png(&beside(path, name), film.window().width() as usize, pixels)
+    let (path, width) = (beside(path, aov.channels().1[0]), film.window().width() as usize);
+    match plane {
+        PlaneData::Id(ids) if aov == Aov::Group => write_png(&path, width, ids.iter().map(|&id| group_color(id))),
+        PlaneData::Id(ids) => {
+            write_png(&path, width, ids.iter().map(|&id| REASON_COLORS[id as usize % REASON_COLORS.len()]))
+        }
+        PlaneData::Float(channels) => write_png(&path, width, error_colors(&channels[0])),
+    }
 }
 
 fn beside(path: &Path, name: &str) -> PathBuf {
@@ -75,29 +76,29 @@ fn group_color(group: u32) -> [f32; 3] {
 }
 
 /// From dark blue to yellow at the largest error; black where there is none.
-fn error_colors(errors: &[f32]) -> Vec<[f32; 3]> {
+fn error_colors(errors: &[f32]) -> impl ExactSizeIterator<Item = [f32; 3]> {
     let largest = errors.iter().fold(f32::MIN_POSITIVE, |a, &b| a.max(b));
-    let color = |&e: &f32| if e > 0.0 { viridis(e / largest).to_array().map(display_value) } else { [0.0; 3] };
-    errors.iter().map(color).collect()
+    let color = move |&e: &f32| if e > 0.0 { viridis(e / largest).to_array().map(display_value) } else { [0.0; 3] };
+    errors.iter().map(color)
 }
 
-fn layers(film: &Film, size: [u32; 2]) -> ImageLayers {
-    let (width, height) = (film.window().width() as usize, film.window().height() as usize);
-    let color = |k: usize| ChannelData::F32(film.colors().iter().map(|c| c[k]).collect());
-    let beauty = ["R", "G", "B"].iter().enumerate().map(|(k, name)| ((*name).to_owned(), color(k)));
-    let mut layers = vec![Layer { name: String::new(), channels: beauty.collect(), half: true }];
+/// Everything on the film. Only the picture itself is stored in 16 bits.
+fn channels(film: &Film, size: [u32; 2]) -> Channels<'_> {
+    let color = |k: usize| (["R", "G", "B"][k].to_owned(), Samples::Color(film.colors(), k));
+    let mut channels: Vec<_> = (0..3).map(color).collect();
     for (aov, plane) in film.planes() {
-        let (name, channels) = aov.channels();
-        let data = match plane {
-            PlaneData::Float(planes) => planes.iter().cloned().map(ChannelData::F32).collect(),
-            PlaneData::Id(ids) => vec![ChannelData::U32(ids.clone())],
+        let (layer, names) = aov.channels();
+        let full_name = |name: &&str| if layer.is_empty() { (*name).to_owned() } else { format!("{layer}.{name}") };
+        let samples: Vec<_> = match plane {
+            PlaneData::Float(planes) => planes.iter().map(|plane| Samples::F32(plane)).collect(),
+            PlaneData::Id(ids) => vec![Samples::U32(ids)],
         };
-        let named = channels.iter().map(|c| (*c).to_owned()).zip(data).collect();
-        // Plain channels live in the beauty layer, under their own names and at full precision in a layer apart.
-        layers.push(Layer { name: name.to_owned(), channels: named, half: false });
+        channels.extend(names.iter().map(full_name).zip(samples));
     }
-    let place = [film.window().x0, film.window().y0].map(|n| n as usize);
-    ImageLayers { width, height, place, whole: size.map(|n| n as usize), layers }
+    let window = film.window();
+    let (width, height) = (window.width() as usize, window.height() as usize);
+    let place = [window.x0, window.y0].map(|n| n as usize);
+    Channels { width, height, place, whole: size.map(|n| n as usize), channels }
 }
 
 #[cfg(test)]
@@ -116,6 +117,6 @@ mod tests {
     fn pictures_of_groups_lie_beside_the_picture() {
         assert_eq!(beside(Path::new("a/b.png"), "group"), Path::new("a/b.group.png"));
         assert_ne!(group_color(1), group_color(2));
-        assert_eq!((group_color(NO_GROUP), error_colors(&[0.0, 1.0])[0]), ([0.0; 3], [0.0; 3]));
+        assert_eq!((group_color(NO_GROUP), error_colors(&[0.0, 1.0]).next()), ([0.0; 3], Some([0.0; 3])));
     }
 }

@@ -41,7 +41,7 @@ pub fn display_value(linear: f32) -> f32 {
 }
 
 /// The display values of pixels. Those that look like the one before, as a background does, are found once.
-pub fn display_pixels(linear: &[[f32; 3]]) -> impl Iterator<Item = [f32; 3]> {
+pub fn display_pixels(linear: &[[f32; 3]]) -> impl ExactSizeIterator<Item = [f32; 3]> {
     let mut last = ([0.0; 3], [0.0; 3]);
     linear.iter().map(move |&pixel| {
         if pixel != last.0 {

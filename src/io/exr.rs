@@ -1,39 +1,74 @@
 //! OpenEXR files: linear colours and named layers.
 
-use super::picture::{ChannelData, ImageLayers, Layer, RgbPicture, check_size};
+use super::picture::{Channels, RgbPicture, Samples, check_size};
 use super::write::write_whole;
 use crate::error::Result;
+use ::exr::block::lines::LineRefMut;
+use ::exr::image::write::samples::{SamplesWriter, WritableSamples};
+use ::exr::math::RoundingMode;
+use ::exr::meta::attribute::{LevelMode, SampleType};
+use ::exr::meta::header::Header;
 use ::exr::prelude::*;
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
 
-/// Writes all layers as channels of one part, which every viewer reads: `R`, `G`, `B`, `Z`, `N.X`, ...
+/// Writes all channels as one part, which every viewer reads: `R`, `G`, `B`, `Z`, `N.X`, ...
 ///
 /// Lossless, one thread, no date: equal pictures give equal files. A part of a picture is the data window, the whole
-/// the display window.
-pub fn write_exr(path: &Path, picture: &ImageLayers) -> Result<()> {
-    let channels = picture.layers.iter().flat_map(layer_channels).collect();
+/// the display window. Samples are taken from where they are, some rows at a time.
+pub fn write_exr(path: &Path, picture: &Channels<'_>) -> Result<()> {
+    let channels = picture.channels.iter().map(|(name, samples)| AnyChannel::new(name.as_str(), *samples)).collect();
     let size = Vec2(picture.width, picture.height);
     let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::SMALL_FAST_LOSSLESS };
     let [x, y] = picture.place.map(|n| n as i32);
     let attributes = LayerAttributes { layer_position: Vec2(x, y), ..LayerAttributes::default() };
-    let layer = ::exr::image::Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
+    let layer = Layer::new(size, attributes, encoding, AnyChannels::sort(channels));
     let mut image = Image::from_layer(layer);
     let [width, height] = picture.whole;
     image.attributes.display_window = IntegerBounds::from_dimensions(Vec2(width, height));
     write_whole(path, |out| image.write().non_parallel().to_buffered(out).map_err(io_error))
 }
 
-fn layer_channels(layer: &Layer) -> impl Iterator<Item = AnyChannel<FlatSamples>> {
-    layer.channels.iter().map(|(name, data)| {
-        let full_name = if layer.name.is_empty() { name.clone() } else { format!("{}.{name}", layer.name) };
-        let samples = match data {
-            ChannelData::U32(ids) => FlatSamples::U32(ids.clone()),
-            ChannelData::F32(values) if layer.half => FlatSamples::F16(values.iter().map(|&v| to_half(v)).collect()),
-            ChannelData::F32(values) => FlatSamples::F32(values.clone()),
+impl<'s> WritableSamples<'s> for Samples<'_> {
+    type Writer = Rows<'s>;
+
+    fn sample_type(&self) -> SampleType {
+        match self {
+            Self::Color(..) => SampleType::F16,
+            Self::F32(_) => SampleType::F32,
+            Self::U32(_) => SampleType::U32,
+        }
+    }
+
+    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
+        (LevelMode::Singular, RoundingMode::Down)
+    }
+
+    fn create_samples_writer(&'s self, header: &Header) -> Rows<'s> {
+        Rows { width: header.layer_size.width(), samples: *self }
+    }
+}
+
+/// A channel being written.
+pub struct Rows<'a> {
+    width: usize,
+    samples: Samples<'a>,
+}
+
+impl SamplesWriter for Rows<'_> {
+    fn extract_line(&self, line: LineRefMut<'_>) {
+        let at = line.location.position;
+        let range = at.y() * self.width + at.x()..at.y() * self.width + at.x() + line.location.sample_count;
+        let written = match self.samples {
+            Samples::Color(colors, channel) => {
+                let colors = &colors[range];
+                line.write_samples(|i| to_half(colors[i][channel]))
+            }
+            Samples::F32(values) => line.write_samples_from_slice(&values[range]),
+            Samples::U32(ids) => line.write_samples_from_slice(&ids[range]),
         };
-        AnyChannel::new(full_name.as_str(), samples)
-    })
+        written.expect("a line has room for its samples");
+    }
 }
 
 /// The nearest half; finite values stay finite, since one infinite pixel spoils whatever filters the picture.
@@ -81,18 +116,17 @@ mod tests {
     use super::*;
     use crate::io::picture::read_rgb;
 
-    fn picture() -> ImageLayers {
-        let ramp = |scale: f32| ChannelData::F32((0..6).map(|i| i as f32 * scale).collect());
-        let beauty = Layer {
-            name: String::new(),
-            channels: vec![("R".into(), ramp(0.5)), ("G".into(), ramp(1e6)), ("B".into(), ramp(-0.25))],
-            half: true,
-        };
-        let depth = Layer { name: String::new(), channels: vec![("Z".into(), ramp(0.1))], half: false };
-        let normal = Layer { name: "N".into(), channels: vec![("X".into(), ramp(0.1))], half: false };
-        let ids = ChannelData::U32(vec![0, 1, 2, 3, 16_777_217, u32::MAX]);
-        let id = Layer { name: String::new(), channels: vec![("id".into(), ids)], half: false };
-        ImageLayers { width: 3, height: 2, place: [1, 4], whole: [9, 7], layers: vec![beauty, depth, normal, id] }
+    const COLORS: [[f32; 3]; 6] =
+        [[0.0; 3], [0.5, 1e6, -0.25], [1.0, 2e6, -0.5], [1.5, 3e6, -0.75], [2.0, 4e6, -1.0], [2.5, 5e6, -1.25]];
+    const RAMP: [f32; 6] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5];
+    const IDS: [u32; 6] = [0, 1, 2, 3, 16_777_217, u32::MAX];
+
+    fn picture() -> Channels<'static> {
+        let [r, g, b] = [0, 1, 2].map(|k| Samples::Color(&COLORS, k));
+        let (ramp, ids) = (Samples::F32(&RAMP), Samples::U32(&IDS));
+        let channels = [("R", r), ("G", g), ("B", b), ("Z", ramp), ("N.X", ramp), ("id", ids)];
+        let channels = channels.map(|(name, samples)| (name.to_owned(), samples)).into();
+        Channels { width: 3, height: 2, place: [1, 4], whole: [9, 7], channels }
     }
 
     #[test]
@@ -108,9 +142,9 @@ mod tests {
             channels.iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().count())).collect();
         let expected = ["B", "G", "N.X", "R", "Z", "id"].map(|name| (name.to_owned(), 6));
         assert_eq!(kinds, expected);
-        assert_eq!(channels[5].sample_data, FlatSamples::U32(vec![0, 1, 2, 3, 16_777_217, u32::MAX]));
+        assert_eq!(channels[5].sample_data, FlatSamples::U32(IDS.to_vec()));
         assert!(matches!(&channels[3].sample_data, FlatSamples::F16(r) if r[3].to_f32() == 1.5));
-        assert!(matches!(&channels[4].sample_data, FlatSamples::F32(z) if z[3] == 0.1 * 3.0));
+        assert!(matches!(&channels[4].sample_data, FlatSamples::F32(z) if z[..] == RAMP));
     }
 
     #[test]
@@ -137,7 +171,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("z.exr");
         let mut depth = picture();
-        depth.layers.remove(0);
+        depth.channels.drain(..3);
         write_exr(&path, &depth).unwrap();
         assert!(read_rgb(&path).unwrap_err().to_string().contains("z.exr: the EXR file cannot be read: "));
     }

@@ -12,9 +12,9 @@ pub(super) const MAX_PIXELS: usize = 1 << 28;
 /// Most bytes of samples that a byte of a valid file can stand for; deflate reaches 1032.
 const MAX_RATIO: u64 = 1100;
 
-/// What an EXR file gets: layers of equal size.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImageLayers {
+/// What an EXR file gets: channels of a part of a picture, lent by whoever holds them.
+#[derive(Clone, Debug)]
+pub struct Channels<'a> {
     /// Pixels per row.
     pub width: usize,
     /// Rows.
@@ -23,28 +23,19 @@ pub struct ImageLayers {
     pub place: [usize; 2],
     /// Columns and rows of the whole picture.
     pub whole: [usize; 2],
-    /// Layers; several may have the empty name.
-    pub layers: Vec<Layer>,
+    /// Names and samples. `R`, `G` and `B` are the picture; `N.X` is channel `X` of layer `N`.
+    pub channels: Vec<(String, Samples<'a>)>,
 }
 
-/// Channels that belong together.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Layer {
-    /// Prefix of the channels' names: `N` and `X` make `N.X`. The empty name is the beauty layer, with plain names.
-    pub name: String,
-    /// Channel names and samples, row by row from the top, `width * height` each.
-    pub channels: Vec<(String, ChannelData)>,
-    /// Whether floating-point channels are stored in 16 bits.
-    pub half: bool,
-}
-
-/// The samples of one channel.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ChannelData {
-    /// Floating-point samples; colours are linear.
-    F32(Vec<f32>),
+/// The samples of one channel, row by row from the top.
+#[derive(Clone, Copy, Debug)]
+pub enum Samples<'a> {
+    /// Red (0), green (1) or blue (2) of linear colours, to be stored in 16 bits.
+    Color(&'a [[f32; 3]], usize),
+    /// Measures.
+    F32(&'a [f32]),
     /// Ids and counts.
-    U32(Vec<u32>),
+    U32(&'a [u32]),
 }
 
 /// A picture that was read: linear RGB with Rec. 709 primaries.
@@ -104,10 +95,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let (png, exr) = (folder.path().join("a.png"), folder.path().join("a.exr"));
         png::write_png(&png, 5, [[0.25, 0.5, 1.0]; 20]).unwrap();
-        let channel = |name: &str| (name.to_owned(), ChannelData::F32(vec![0.5; 20]));
-        let layer = Layer { name: String::new(), channels: ["R", "G", "B"].map(channel).into(), half: true };
-        exr::write_exr(&exr, &ImageLayers { width: 5, height: 4, place: [0, 0], whole: [5, 4], layers: vec![layer] })
-            .unwrap();
+        let colors = [[0.5; 3]; 20];
+        let channel = |k: usize| (["R", "G", "B"][k].to_owned(), Samples::Color(&colors, k));
+        let channels = [0, 1, 2].map(channel).into();
+        exr::write_exr(&exr, &Channels { width: 5, height: 4, place: [0, 0], whole: [5, 4], channels }).unwrap();
         [png, exr].map(|path| std::fs::read(path).unwrap())
     }
 

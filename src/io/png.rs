@@ -8,7 +8,7 @@ use ::png::{
     BitDepth, ColorType, Compression, Decoder, Encoder, EncodingError, Limits, ScaledFloat, SrgbRenderingIntent,
     Transformations,
 };
-use std::io::{self, BufReader, Read, Seek};
+use std::io::{self, BufReader, Read, Seek, Write};
 use std::path::Path;
 
 /// Writes display-referred pixels: sRGB values in 0..1 (others are clamped, NaN is 0), row by row from the top.
@@ -17,11 +17,15 @@ use std::path::Path;
 ///
 /// # Panics
 /// If the pixels do not make whole rows of `width`.
-pub fn write_png(path: &Path, width: usize, pixels: impl IntoIterator<Item = [f32; 3]>) -> Result<()> {
-    let bytes: Vec<[u8; 3]> = pixels.into_iter().map(|pixel| pixel.map(quantise)).collect();
-    assert!(width > 0 && bytes.len().is_multiple_of(width), "{} pixels in rows of {width}", bytes.len());
+pub fn write_png<P>(path: &Path, width: usize, pixels: P) -> Result<()>
+where
+    P: IntoIterator<Item = [f32; 3], IntoIter: ExactSizeIterator>,
+{
+    let mut pixels = pixels.into_iter();
+    let n = pixels.len();
+    assert!(width > 0 && n.is_multiple_of(width), "{n} pixels in rows of {width}");
     write_whole(path, |out| {
-        let mut encoder = Encoder::new(out, width as u32, (bytes.len() / width) as u32);
+        let mut encoder = Encoder::new(out, width as u32, (n / width) as u32);
         encoder.set_color(ColorType::Rgb);
         encoder.set_depth(BitDepth::Eight);
         encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
@@ -29,7 +33,13 @@ pub fn write_png(path: &Path, width: usize, pixels: impl IntoIterator<Item = [f3
         encoder.set_source_gamma(ScaledFloat::from_scaled(45455));
         encoder.set_compression(Compression::Fast);
         let mut writer = encoder.write_header().map_err(io_error)?;
-        writer.write_image_data(bytes.as_flattened()).map_err(io_error)?;
+        let mut rows = writer.stream_writer().map_err(io_error)?;
+        let mut row = vec![[0; 3]; width];
+        for _ in 0..n / width {
+            row.iter_mut().zip(&mut pixels).for_each(|(bytes, pixel)| *bytes = pixel.map(quantise));
+            rows.write_all(row.as_flattened())?;
+        }
+        rows.finish().map_err(io_error)?;
         writer.finish().map_err(io_error)
     })
 }

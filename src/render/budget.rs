@@ -31,6 +31,12 @@ const BYTES_PER_RING_POINT: usize = 24 << 10;
 /// Points of a ring that a worker has room for anyway.
 const ORDINARY_RING: usize = 64;
 
+/// Pixels of the film that the encoder of EXR files takes at once: a tile. That of PNG files takes a row.
+const WRITTEN_AT_ONCE: u64 = 256 * 256;
+
+/// Forms of these pixels that are there at the same time: 4 times their bytes were allocated with all AOVs, 3 without.
+const FORMS_OF_WRITTEN: u64 = 4;
+
 /// Bytes for everything too small to be counted: progress bar, statistics, code that was not run yet.
 const ODDS_AND_ENDS: u64 = 2 << 20;
 
@@ -59,8 +65,9 @@ impl RenderNeeds {
         let of_rings = BYTES_PER_RING_POINT * largest_ring.saturating_sub(ORDINARY_RING);
         let workers = ((WORKER_BYTES + of_rings) * threads) as u64;
         let groups = group_bytes(settings, threads) as u64;
-        // Channel by channel the film is copied once; encoders hold a copy of some lines in another form.
-        Self { resident, tables: tables as u64, film, workers, groups, writing: 2 * film }
+        let n_tiles = (settings.window.n_pixels() as u64).div_ceil(WRITTEN_AT_ONCE).max(1);
+        let writing = FORMS_OF_WRITTEN * film.div_ceil(n_tiles);
+        Self { resident, tables: tables as u64, film, workers, groups, writing }
     }
 
     fn without_cache(&self) -> u64 {
