@@ -28,6 +28,7 @@ use crate::scene::camera::Camera;
 use glam::{DVec2, DVec3, Vec3};
 use parking_lot::Mutex;
 use serde::Serialize;
+use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -181,11 +182,33 @@ impl BenchSettings {
     fn block_size(&self) -> [u32; 2] {
         if self.one_by_one { [TILE; 2] } else { PACKET_SIZE }
     }
+
+    /// Passes of all measurements, the first ones of primary and occlusion rays included.
+    fn n_passes(&self) -> usize {
+        let [primary, ao, diffuse] = self.passes.map(usize::from);
+        let of_measurement = self.repeat * if self.threads > 1 { 2 } else { 1 };
+        1 + primary * of_measurement + ao * (1 + of_measurement) + 2 * diffuse * of_measurement
+    }
+}
+
+/// Counts passes, for whoever waits.
+struct Passes<'p> {
+    n_done: Cell<usize>,
+    n: usize,
+    report: &'p dyn Fn(usize, usize),
+}
+
+impl Passes<'_> {
+    fn done(&self) {
+        self.n_done.set(self.n_done.get() + 1);
+        (self.report)(self.n_done.get(), self.n);
+    }
 }
 
 /// The rays of the recipe and their results.
-pub struct Bench {
+pub struct Bench<'p> {
     settings: BenchSettings,
+    passes: Passes<'p>,
     camera: Camera,
     tiles: Vec<PixelRect>,
     eye: DVec3,
@@ -209,12 +232,14 @@ pub fn face_parameters(face_size: u32, hit: &Hit) -> [f32; 2] {
     [offset(hit.sub) + hit.u, offset(hit.sub >> 2) + hit.v]
 }
 
-impl Bench {
-    /// Makes the primary rays and room for their results.
-    pub fn new(camera: &Camera, settings: BenchSettings) -> Self {
+impl<'p> Bench<'p> {
+    /// Makes the primary rays and room for their results. `progress` will be told how many passes are done, and of how
+    /// many.
+    pub fn new(camera: &Camera, settings: BenchSettings, progress: &'p dyn Fn(usize, usize)) -> Self {
         let n = PixelRect::whole(settings.size).n_pixels();
         let mut bench = Self {
             settings,
+            passes: Passes { n_done: Cell::new(0), n: settings.n_passes(), report: progress },
             camera: *camera,
             tiles: PixelRect::whole(settings.size).blocks([TILE; 2]).collect(),
             eye: camera.eye().as_vec3().as_dvec3(),
@@ -246,25 +271,28 @@ impl Bench {
         let mut result = BenchResult::default();
         let bench_hit = |hit: Option<&Hit>| hit.map_or(BenchHit::MISS, &bench_hit);
         self.run_primary(&make_tracer, &bench_hit, &mut result);
-        if !self.settings.passes[1] && !self.settings.passes[2] {
-            return result;
+        if self.settings.passes[1] || self.settings.passes[2] {
+            self.run_secondary(&make_tracer, &mut result);
         }
+        debug_assert_eq!(self.passes.n_done.get(), self.passes.n, "passes are counted in advance");
+        result
+    }
+
+    fn run_secondary<T: Intersect>(&self, make_tracer: &(impl Fn() -> T + Sync), result: &mut BenchResult) {
         let (ao, mut diffuse) = self.secondary_rays(&mut make_tracer());
         if self.settings.passes[1] {
-            self.run_ao(&make_tracer, &ao, &mut result);
+            self.run_ao(make_tracer, &ao, result);
         }
         if self.settings.passes[2] {
-            let rays = &diffuse;
-            let mut hits = vec![false; rays.len()];
-            result.diffuse_tile_order = Some(self.run_diffuse(&make_tracer, rays, &mut hits));
+            let mut hits = vec![false; diffuse.len()];
+            result.diffuse_tile_order = Some(self.run_diffuse(make_tracer, &diffuse, &mut hits));
             for i in (2..=diffuse.len()).rev() {
                 diffuse.swap(i - 1, (hash2(i as u32, 77) as usize) % i);
             }
-            result.diffuse_shuffled = Some(self.run_diffuse(&make_tracer, &diffuse, &mut hits));
+            result.diffuse_shuffled = Some(self.run_diffuse(make_tracer, &diffuse, &mut hits));
             result.diffuse_rays = diffuse.len();
             result.diffuse_hit = share(&hits);
         }
-        result
     }
 
     fn run_primary<T: Intersect>(
@@ -274,6 +302,7 @@ impl Bench {
         result: &mut BenchResult,
     ) {
         let (tiles, camera, eye, settings) = (&self.tiles, &self.camera, self.eye, &self.settings);
+        let passes = &self.passes;
         let directions = split(&self.primary, tiles);
         let mut hits: Vec<_> = split_mut(&mut self.hits, tiles);
         let mut pass = |threads| {
@@ -289,8 +318,9 @@ impl Bench {
             })
         };
         result.first_pass_s = pass(settings.threads).0;
+        passes.done();
         if settings.passes[0] {
-            result.primary = Some(measure(settings, self.primary.len(), &mut pass));
+            result.primary = Some(measure(settings, passes, self.primary.len(), &mut pass));
         }
         let hits = self.order.iter().map(|&place| &self.hits[place]).filter(|h| h.t < f32::INFINITY);
         let (n, sum) = hits.fold((0, 0.0), |(n, sum), h| (n + 1, sum + f64::from(h.t)));
@@ -305,11 +335,11 @@ impl Bench {
         result: &mut BenchResult,
     ) {
         let mut occluded = vec![false; rays.len()];
-        let batch = self.in_batches(rays);
+        let (batch, size) = (self.in_batches(rays), self.settings.batch);
         let mut chunks: Vec<&mut [bool]> = occluded.chunks_mut(self.settings.task_size()).collect();
         let mut pass = |threads| match &batch {
             Some(batch) => parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
-                tracer.occluded_batch(&batch[chunk * self.settings.batch..][..out.len()], out);
+                tracer.occluded_batch(&batch[chunk * size..][..out.len()], out);
             }),
             None => parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
                 for (ray, out) in rays[chunk * CHUNK..].iter().zip(out.iter_mut()) {
@@ -318,7 +348,8 @@ impl Bench {
             }),
         };
         result.ao_first_s = pass(self.settings.threads).0;
-        result.ao = Some(measure(&self.settings, rays.len(), &mut pass));
+        self.passes.done();
+        result.ao = Some(measure(&self.settings, &self.passes, rays.len(), &mut pass));
         result.ao_rays = rays.len();
         result.ao_occluded = share(&occluded);
     }
@@ -333,7 +364,7 @@ impl Bench {
             return self.run_diffuse_in_batches(make_tracer, &rays, is_hit);
         }
         let mut chunks: Vec<&mut [bool]> = is_hit.chunks_mut(CHUNK).collect();
-        measure(&self.settings, rays.len(), &mut |threads| {
+        measure(&self.settings, &self.passes, rays.len(), &mut |threads| {
             parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
                 for (ray, out) in rays[chunk * CHUNK..].iter().zip(out.iter_mut()) {
                     *out = tracer.closest(&ray.ray()).is_some();
@@ -351,7 +382,7 @@ impl Bench {
         let size = self.settings.batch;
         let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
         let mut chunks: Vec<&mut [Option<Hit>]> = hits.chunks_mut(size).collect();
-        let rates = measure(&self.settings, rays.len(), &mut |threads| {
+        let rates = measure(&self.settings, &self.passes, rays.len(), &mut |threads| {
             parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
                 tracer.closest_batch(&rays[chunk * size..][..out.len()], out);
             })
@@ -470,11 +501,17 @@ fn parallel<T, R: Send>(
     (start.elapsed().as_secs_f64(), cpu)
 }
 
-fn measure(settings: &BenchSettings, rays: usize, pass: &mut impl FnMut(usize) -> (f64, f64)) -> Rates {
+fn measure(
+    settings: &BenchSettings,
+    passes: &Passes<'_>,
+    rays: usize,
+    pass: &mut impl FnMut(usize) -> (f64, f64),
+) -> Rates {
     let mut with = |threads: usize| {
         let (mut wall, mut cpu) = (Vec::new(), Vec::new());
         for _ in 0..settings.repeat {
             let (w, c) = pass(threads);
+            passes.done();
             wall.push(w);
             cpu.push(c / threads as f64);
         }
@@ -560,7 +597,7 @@ mod tests {
         };
         let description =
             crate::scene::description::CameraDescription { eye: DVec3::ZERO, at: DVec3::X, up: DVec3::Y, fov: 35.0 };
-        let mut pixels = Bench::new(&Camera::new(&description), settings).pixel;
+        let mut pixels = Bench::new(&Camera::new(&description), settings, &|_, _| ()).pixel;
         pixels.sort_unstable();
         assert_eq!(pixels, (0..37 * 21).collect::<Vec<_>>());
     }

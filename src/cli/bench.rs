@@ -3,6 +3,7 @@
 use super::camera::CameraArgs;
 use super::input::EditArgs;
 use super::outputs::check_outputs;
+use super::progress::Progress;
 use super::run_options::RunArgs;
 use super::values::{count, fixed_rate, picture_size};
 use super::{PICTURE, stdout};
@@ -134,7 +135,9 @@ impl BenchArgs {
             passes: [RayKind::Primary, RayKind::Ao, RayKind::Diffuse].map(|k| self.rays.contains(&k)),
             diagonal: bounds.diagonal(),
         };
-        let mut bench = Bench::new(&camera, settings);
+        let progress = Progress::new("passes", self.run.quiet);
+        let show = |done, n| progress.set(done, n);
+        let mut bench = Bench::new(&camera, settings, &show);
         let rss_before = resident_bytes().unwrap_or(0);
         let watch = Stopwatch::start();
         let rate = DicingRate::Fixed(self.rate);
@@ -173,6 +176,7 @@ impl BenchArgs {
         if let Some(path) = &self.hits {
             write_whole(path, |out| out.write_all(&bench.hit_bytes()))?;
         }
+        progress.finish();
         self.print(&report)
     }
 
