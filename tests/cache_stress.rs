@@ -33,7 +33,7 @@ impl Stress {
             self.one_visit(&pin.visit(), &mut state);
             n_visits += 1;
             if n_visits % 1024 == 0 {
-                pin.release();
+                pin = self.cache.pin();
             }
         }
         n_visits

@@ -65,8 +65,8 @@ impl Pins {
 
 /// A thread's right to read the cache. Neither `Send` nor `Sync`.
 ///
-/// A pin that is idle for long should be [released](Pin::release): while it stands still it keeps the cache from
-/// recycling what it could read, and others build blocks for themselves only.
+/// A pin that is idle for long should be dropped: while it stands still it keeps the cache from recycling what it could
+/// read, and others build blocks for themselves only.
 pub struct Pin<'c> {
     pub(super) cache: &'c SegmentCache,
     /// The pin word, `None` if there were more pins than expected: such a pin sees an empty cache and leaves it alone.
@@ -120,12 +120,6 @@ impl<'c> Pin<'c> {
             self.move_to_head();
         }
         Visit { pin: self }
-    }
-
-    /// Lets go of everything until the next visit.
-    pub fn release(&mut self) {
-        self.scratch.clear();
-        self.unpin();
     }
 
     fn unpin(&mut self) {

@@ -268,6 +268,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
 
     /// Follows edges that the tiles around show into the groups of one.
     fn follow_across_seams(&mut self, surprises: &Surprises, canvas: &Mutex<Canvas>) {
+        let watch = Instant::now();
         let Surprises { tile, pixels } = surprises;
         follow(*tile, REACH, pixels.clone(), |pixel| {
             let Some(expected) = canvas.lock().interpolated(pixel) else { return false };
@@ -278,6 +279,7 @@ impl<T: Tracer> Worker<'_, '_, T> {
             }
             display_difference(expected, Vec3::from(record.color)) > self.job.edge()
         });
+        self.outcome.seconds.trace += watch.elapsed().as_secs_f64();
     }
 
     /// A pixel that an edge may reach: all samples after those of `exposure`.

@@ -12,12 +12,11 @@ use super::reason::Reason;
 use super::sampler::subpixel;
 use super::settings::{Appearance, RenderSettings, RunSettings};
 use super::tracer::Built;
-use super::workers::{PixelTracer, SAMPLES_AT_ONCE};
+use super::workers::PixelTracer;
 use crate::ids::MeshId;
 use crate::scene::camera::Camera;
 use crate::scene::description::IntegratorKind;
 use glam::{DVec2, DVec3, Vec2, Vec3};
-use std::sync::atomic::Ordering;
 
 /// Steps from one pixel to the next, in display units, that are followed whatever the tolerance: an edge may begin
 /// faintly. With
@@ -52,7 +51,7 @@ pub(super) struct Interpolation<'a> {
 impl<'a> Interpolation<'a> {
     /// Whether tiles that were begun are not finished any more.
     pub fn is_given_up(&self) -> bool {
-        self.settings.spp > SAMPLES_AT_ONCE && self.run.cancel.load(Ordering::Relaxed)
+        self.run.gives_up_tiles(self.settings.spp)
     }
 
     pub fn is_possible(&self) -> bool {

@@ -7,7 +7,7 @@ use crate::scene::light::sky_radiance;
 use glam::Vec3;
 use std::fmt;
 use std::str::FromStr;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the picture is. Equal settings and scenes give equal bytes.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,10 +106,20 @@ pub struct RunSettings<'a> {
     pub progress: &'a (dyn Fn(Progress) + Sync),
 }
 
+/// With more samples a pixel than this a tile that was begun is given up when the render is cancelled; with fewer it is
+/// finished, which takes no time that anybody would notice.
+const SAMPLES_AT_ONCE: u32 = 64;
+
 impl<'a> RunSettings<'a> {
     /// Tiles of 16 × 16 pixels and no report of progress.
     pub fn quiet(threads: usize, cancel: &'a AtomicBool) -> Self {
         Self { threads, tile_side: 16, cancel, progress: &|_| () }
+    }
+
+    /// Whether tiles that were begun, of so many samples a pixel, are not finished any more: the render was cancelled,
+    /// and to finish them would take long.
+    pub(super) fn gives_up_tiles(&self, spp: u32) -> bool {
+        spp > SAMPLES_AT_ONCE && self.cancel.load(Ordering::Relaxed)
     }
 }
 

@@ -81,10 +81,6 @@ pub fn render<T: Tracer>(
     Rendered { complete: film.n_done() == settings.window.n_pixels(), film, rays, pixels, seconds: Default::default() }
 }
 
-/// With more samples a pixel than this a tile that was begun is given up when the render is cancelled; with fewer it is
-/// finished, which takes no time that anybody would notice.
-pub(super) const SAMPLES_AT_ONCE: u32 = 64;
-
 /// Hands out tiles until there are no more, or the render is cancelled.
 pub(super) struct TileQueue<'a> {
     run: &'a RunSettings<'a>,
@@ -195,21 +191,24 @@ impl PixelTracer<'_> {
         exposures: &mut [Exposure],
         run: &RunSettings<'_>,
     ) -> bool {
-        let is_given_up = || self.settings.spp > SAMPLES_AT_ONCE && run.cancel.load(Ordering::Relaxed);
+        let spp = self.settings.spp;
         if self.settings.shows_misses() {
             // One by one, so that it is known which pixel a block was built for.
             for (pixel, exposure) in tile.pixels().zip(exposures) {
-                self.expose(shader, pixel, exposure, self.settings.spp);
+                if run.gives_up_tiles(spp) {
+                    return false;
+                }
+                self.expose(shader, pixel, exposure, spp);
             }
             return true;
         }
         for block in tile.blocks(PACKET_SIZE) {
-            if is_given_up() {
+            if run.gives_up_tiles(spp) {
                 return false;
             }
             let _witness = PanicWitness(block);
             let mut pixels = block.pixels().cycle();
-            let samples = (0..self.settings.spp).flat_map(|i| block.pixels().map(move |pixel| self.sample(pixel, i)));
+            let samples = (0..spp).flat_map(|i| block.pixels().map(move |pixel| self.sample(pixel, i)));
             shader.samples(self.camera, samples, |sample| {
                 let idx = pixels.next().and_then(|pixel| tile.idx(pixel)).expect("a block of the tile has pixels");
                 exposures[idx].add(&sample);
