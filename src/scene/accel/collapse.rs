@@ -2,7 +2,8 @@
 //! Karras, Laine: "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", 2017, section 3.1).
 
 use super::LANES;
-use super::groups::{Group, aabb, half_area};
+use super::groups::Group;
+use super::slabs::{aabb, half_area};
 use crate::math::Bounds;
 use obvhs::bvh2::Bvh2;
 

@@ -6,8 +6,9 @@
 
 use super::LANES;
 use super::build::Care;
+use super::slabs::{Slab, aabb, cheapest_boundary, half_area};
 use crate::math::Bounds;
-use glam::{Vec3, Vec3A};
+use glam::Vec3A;
 use obvhs::aabb::Aabb;
 
 /// Boxes of which all three orders are compared; of more, slabs along one axis or all are.
@@ -70,19 +71,8 @@ fn divide(items: &mut [Item], care: Care, groups: &mut Vec<Group>) {
     divide(high, care, groups);
 }
 
-/// In vectors of four lanes, which groups are found faster with.
-pub(super) fn aabb(b: &Bounds) -> Aabb {
-    Aabb::new(Vec3A::from(b.min), Vec3A::from(b.max))
-}
-
 fn union(items: &[Item]) -> Aabb {
     items.iter().fold(Aabb::INVALID, |all, item| all.union(&item.bounds))
-}
-
-/// Half the surface; 0 of [`Aabb::INVALID`].
-pub(super) fn half_area(b: &Aabb) -> f32 {
-    let size = Vec3::from((b.max - b.min).max(Vec3A::ZERO));
-    size.x * size.y + size.y * size.z + size.z * size.x
 }
 
 /// Sorts along the axis of the cheapest division; returns where it is.
@@ -159,9 +149,9 @@ fn split_slabs(items: &mut [Item], care: Care) -> usize {
     let axes = if care == Care::Thorough { 0..3 } else { longest..longest + 1 };
     let scale = Vec3A::splat(N_BINS as f32) / extent.max(Vec3A::splat(f32::MIN_POSITIVE));
     let slabs = slabs(items, low, scale, axes.clone());
-    let boundary = |axis: usize| best_boundary(&slabs[axis], n).map(|(cost, near)| (cost, axis, near));
-    let best = axes.filter_map(boundary).min_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, axis, near) = best.unwrap_or((0.0, longest, n / 2));
+    let boundary = |axis: usize| cheapest_boundary(&slabs[axis], 1).map(|boundary| (axis, boundary));
+    let best = axes.filter_map(boundary).min_by(|(_, a), (_, b)| a.cost.total_cmp(&b.cost));
+    let (axis, near) = best.map_or((longest, n / 2), |(axis, boundary)| (axis, boundary.n_below));
     let least = n / LEAST_SHARE;
     let near = near.clamp(least, n - least);
     let middle = (near + LANES / 2) / LANES * LANES;
@@ -170,65 +160,22 @@ fn split_slabs(items: &mut [Item], care: Care) -> usize {
     middle
 }
 
-/// What lies in each of [`N_BINS`] slabs along an axis.
-type Slabs = [Slab; N_BINS];
-
-#[derive(Clone, Copy)]
-struct Slab {
-    bounds: Aabb,
-    n_items: usize,
-}
-
-impl Slab {
-    const EMPTY: Self = Self { bounds: Aabb::INVALID, n_items: 0 };
-
-    fn union(&self, other: &Self) -> Self {
-        Self { bounds: self.bounds.union(&other.bounds), n_items: self.n_items + other.n_items }
-    }
-
-    fn cost(&self) -> f32 {
-        half_area(&self.bounds) * self.n_items as f32
-    }
-}
-
 /// The slabs along some axes, by the centres of items: all in one pass.
-fn slabs(items: &[Item], low: Vec3A, scale: Vec3A, axes: std::ops::Range<usize>) -> [Slabs; 3] {
+fn slabs(items: &[Item], low: Vec3A, scale: Vec3A, axes: std::ops::Range<usize>) -> [[Slab; N_BINS]; 3] {
     let mut slabs = [[Slab::EMPTY; N_BINS]; 3];
     for item in items {
         let bins = ((item.center() - low) * scale).as_uvec3();
         for axis in axes.clone() {
-            let slab = &mut slabs[axis][(bins[axis] as usize).min(N_BINS - 1)];
-            slab.bounds = slab.bounds.union(&item.bounds);
-            slab.n_items += 1;
+            slabs[axis][(bins[axis] as usize).min(N_BINS - 1)].add(&item.bounds);
         }
     }
     slabs
 }
 
-/// The cost of the cheapest boundary between slabs of `n_items` items, and how many are below it, if there is any.
-fn best_boundary(slabs: &Slabs, n_items: usize) -> Option<(f32, usize)> {
-    let mut above = [0.0; N_BINS];
-    let mut all = Slab::EMPTY;
-    for (above, slab) in above.iter_mut().zip(slabs).rev() {
-        all = all.union(slab);
-        *above = all.cost();
-    }
-    let mut below = Slab::EMPTY;
-    let mut best = None;
-    let mut least = f32::INFINITY;
-    for (slab, above) in slabs.iter().zip(&above[1..]) {
-        below = below.union(slab);
-        let cost = below.cost() + above;
-        if below.n_items > 0 && below.n_items < n_items && cost < least {
-            (least, best) = (cost, Some((cost, below.n_items)));
-        }
-    }
-    best
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Vec3;
 
     #[test]
     fn every_box_is_in_one_group_and_all_groups_but_one_are_full() {

@@ -31,6 +31,7 @@ mod groups;
 mod packet_walk;
 mod parts;
 mod plates;
+mod slabs;
 mod traverse;
 mod visit;
 

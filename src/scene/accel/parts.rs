@@ -1,10 +1,11 @@
 //! Dividing boxes into **parts** of neighbours, each small enough for a processor's cache: a part's tree is built by
 //! one thread, beside those of the other parts.
 //!
-//! Boxes are divided in two by the least surface-area cost among [`N_BINS`] slabs of their centres (Wald 2007), and the
-//! halves again. A slab boundary that would leave less than an eighth on one side is passed over, for the median if
-//! need be, so that no arrangement of boxes takes more than a few passes.
+//! Boxes are divided in two at the cheapest boundary between [`N_BINS`] slabs (`slabs.rs`), and the halves again. A
+//! boundary that would leave less than an eighth on one side is passed over, for the median if need be, so that no
+//! arrangement of boxes takes more than a few passes.
 
+use super::slabs::{Slab, aabb, cheapest_boundary};
 use crate::math::Bounds;
 use crate::parallel::for_each;
 use glam::Vec3;
@@ -70,42 +71,16 @@ fn split(boxes: &[Bounds], members: &mut [u32]) -> usize {
     let axis = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).expect("three axes");
     let scale = N_BINS as f32 / extent[axis].max(f32::MIN_POSITIVE);
     let bin = |i: u32| (((of(i)[axis] - low[axis]) * scale) as usize).min(N_BINS - 1);
-    match best_boundary(boxes, members, bin) {
-        Some(boundary) => partition(members, |i| bin(i) < boundary),
+    let mut slabs = [Slab::EMPTY; N_BINS];
+    members.iter().for_each(|&i| slabs[bin(i)].add(&aabb(&boxes[i as usize])));
+    match cheapest_boundary(&slabs, members.len() / LEAST_SHARE) {
+        Some(boundary) => partition(members, |i| bin(i) < boundary.above),
         None => {
             let middle = members.len() / 2;
             members.select_nth_unstable_by(middle, |&a, &b| of(a)[axis].total_cmp(&of(b)[axis]).then(a.cmp(&b)));
             middle
         }
     }
-}
-
-/// The first slab of the far side, if there is a boundary that leaves enough on both.
-fn best_boundary(boxes: &[Bounds], members: &[u32], bin: impl Fn(u32) -> usize) -> Option<usize> {
-    let mut slabs = [(Bounds::EMPTY, 0usize); N_BINS];
-    for &i in members {
-        let slab = &mut slabs[bin(i)];
-        *slab = (slab.0.union(boxes[i as usize]), slab.1 + 1);
-    }
-    let costs = |order: &mut dyn Iterator<Item = usize>| {
-        let mut below = (Bounds::EMPTY, 0);
-        let mut costs = [(0.0, 0); N_BINS];
-        for slab in order {
-            below = (below.0.union(slabs[slab].0), below.1 + slabs[slab].1);
-            costs[slab] = (half_area(&below.0) * below.1 as f32, below.1);
-        }
-        costs
-    };
-    let (up_to, from) = (costs(&mut (0..N_BINS)), costs(&mut (0..N_BINS).rev()));
-    let least = members.len() / LEAST_SHARE;
-    let leaves_enough = |b: &usize| up_to[b - 1].1 >= least && from[*b].1 >= least;
-    let cost = |b: usize| up_to[b - 1].0 + from[b].0;
-    (1..N_BINS).filter(leaves_enough).min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
-}
-
-fn half_area(b: &Bounds) -> f32 {
-    let size = (b.max - b.min).max(Vec3::ZERO);
-    size.x * size.y + size.y * size.z + size.z * size.x
 }
 
 /// Puts those for which `is_first` holds first.
