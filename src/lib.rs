@@ -14,8 +14,8 @@
 //! ```
 //!
 //! Modules in reading order: [`mesh`], [`topology`], [`subdiv`], [`grid`], [`cache`], [`scene`], [`render`], [`image`],
-//! [`check`], [`report`], [`io`], [`bench`](mod@bench), [`cli`]; beneath them all [`ids`], [`error`], [`parallel`] and
-//! [`math`]. `notes/glossary.md` has the words, `notes/architecture.md` the rules.
+//! [`check`], [`report`], [`io`], [`bench`](mod@bench), [`cli`]; beneath them all [`ids`], [`error`], [`names`],
+//! [`parallel`] and [`math`]. `notes/glossary.md` has the words, `notes/architecture.md` the rules.
 //!
 //! A ray at a cube's limit surface, of which one patch is tessellated on the way:
 //!
@@ -48,6 +48,7 @@ pub mod image;
 pub mod io;
 pub mod math;
 pub mod mesh;
+pub mod names;
 pub mod parallel;
 pub mod render;
 pub mod report;

@@ -5,9 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Bottom first: a module may use those before it.
-const ORDER: [&str; 17] = [
-    "ids", "error", "parallel", "math", "mesh", "topology", "subdiv", "grid", "cache", "image", "scene", "render",
-    "io", "report", "bench", "check", "cli",
+const ORDER: [&str; 18] = [
+    "ids", "error", "names", "parallel", "math", "mesh", "topology", "subdiv", "grid", "cache", "image", "scene",
+    "render", "io", "report", "bench", "check", "cli",
 ];
 
 /// Below it, and still none of its business.

@@ -4,6 +4,7 @@ use super::groups::NO_GROUP;
 use super::reason::Reason;
 use super::tiles::PixelRect;
 use super::tracer::Built;
+use crate::names::{by_name, name_of};
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
@@ -71,8 +72,7 @@ impl Aov {
 
 impl fmt::Display for Aov {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (name, _) = Self::ALL.iter().find(|(_, aov)| aov == self).expect("ALL has all");
-        f.write_str(name)
+        f.write_str(name_of(&Self::ALL, self))
     }
 }
 
@@ -80,11 +80,7 @@ impl FromStr for Aov {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let known = Self::ALL.iter().find(|(name, _)| *name == text);
-        known.map(|&(_, aov)| aov).ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|&(name, _)| name).collect();
-            format!("'{text}' is no AOV: choose from {}", names.join(", "))
-        })
+        by_name("AOV", &Self::ALL, text)
     }
 }
 

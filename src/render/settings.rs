@@ -2,6 +2,7 @@
 
 use super::film::Aov;
 use super::tiles::PixelRect;
+use crate::names::{by_name, name_of};
 use crate::scene::description::{DebugView, IntegratorKind, Light, Material};
 use crate::scene::light::sky_radiance;
 use glam::Vec3;
@@ -56,7 +57,7 @@ impl Groups {
 impl fmt::Display for Groups {
     /// Its name on the command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(Self::ALL.iter().find(|(_, groups)| groups == self).map_or("", |(name, _)| name))
+        f.write_str(name_of(&Self::ALL, self))
     }
 }
 
@@ -64,8 +65,7 @@ impl FromStr for Groups {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let known = Self::ALL.iter().find(|(name, _)| *name == text).map(|&(_, groups)| groups);
-        known.ok_or_else(|| format!("'{text}' is no way of grouping pixels: choose off, thesis or adaptive"))
+        by_name("way of grouping pixels", &Self::ALL, text)
     }
 }
 

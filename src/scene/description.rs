@@ -7,6 +7,7 @@
 //! Units: lengths are world units, angles degrees, colours linear RGB with Rec. 709 primaries. A white Lambert surface
 //! (diffuse 1) that faces a directional light of irradiance π has radiance 1, and so has one under a sky of radiance 1.
 
+use crate::names::{by_name, name_of};
 use crate::subdiv::MAX_RATE;
 use glam::{DAffine3, DVec3, Vec3};
 use std::fmt;
@@ -293,8 +294,7 @@ impl fmt::Display for Rate {
 impl fmt::Display for IntegratorKind {
     /// Its name on the command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = Self::ALL.iter().find(|(_, kind)| kind == self);
-        f.write_str(named.map_or("", |(name, _)| name))
+        f.write_str(name_of(&Self::ALL, self))
     }
 }
 
@@ -302,11 +302,7 @@ impl FromStr for IntegratorKind {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let known = Self::ALL.iter().find(|(name, _)| *name == text);
-        known.map(|&(_, kind)| kind).ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|&(name, _)| name).collect();
-            format!("'{text}' is no integrator: choose one of {}", names.join(", "))
-        })
+        by_name("integrator", &Self::ALL, text)
     }
 }
 
@@ -328,6 +324,6 @@ mod tests {
         for (name, kind) in IntegratorKind::ALL {
             assert_eq!(name.parse(), Ok(kind));
         }
-        assert!("debug:nothing".parse::<IntegratorKind>().unwrap_err().contains("choose one of whitted"));
+        assert!("debug:nothing".parse::<IntegratorKind>().unwrap_err().contains("choose from whitted"));
     }
 }

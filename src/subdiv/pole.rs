@@ -231,8 +231,8 @@ pub(super) struct PoleHull<'a, I> {
     pub scratch: &'a mut [[Point; MOST_REFINED]; 2],
 }
 
-/// The points of the regular quarters of a pole's face in rows, of its refined points: those of the apex's side below
-/// the face, [x] from 0, and those from there on, [y][x] with x from -1.
+/// The points of the regular quarters of a pole's face among its refined points: four of the row below the apex, from
+/// its column on, and the four rows from the apex on, of five points each, from the column to its left on.
 #[inline(always)]
 fn rows_of_quarters<T>(refined: &[T]) -> ([&T; 4], [[&T; 5]; 4]) {
     let (inner, outside) = refined.split_last_chunk::<N_OUTSIDE>().expect("a pole's refined points");

@@ -128,7 +128,7 @@ fn every_mistake_gets_a_sentence_with_its_line() {
         ("background = [1, 2, 3, 4]\n", ":1: invalid length 4, expected a colour"),
         ("background = \"red\"\n", ":1: 'red' is no colour: write \"#rrggbb\""),
         ("\n[render]\nrate = \"fine\"\n", ":3: 'fine' is no dicing rate"),
-        ("[render]\nintegrator = \"fast\"\n", ":2: 'fast' is no integrator: choose one of whitted"),
+        ("[render]\nintegrator = \"fast\"\n", ":2: 'fast' is no integrator: choose from whitted"),
         ("[render]\nspp = -1\n", ":2: invalid value: integer `-1`, expected u32"),
         ("[materials.a]\ndiffuse = 1.5\n", ":2: a surface cannot give back more light"),
         ("[materials.a]\nshininess = 0\n", ":2: 0 should be above 0"),
