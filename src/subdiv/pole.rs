@@ -270,8 +270,8 @@ fn joined(rows: [[&usize; 4]; 4]) -> [usize; 16] {
     std::array::from_fn(|i| *rows[i / 4][i % 4])
 }
 
-/// The box of the Bézier points of a pole's regular quarters: quarters side by side have some in common, and all but
-/// the first of a row or a column of theirs.
+/// The box of the Bézier points of a pole's regular quarters. Quarters side by side have those of their border in common,
+/// and of the control points of a row or a column all but one.
 #[inline(always)]
 fn hull_of_quarters<K: Kernel>(k: K, refined: &[Point]) -> (K::D, K::D) {
     let (below, rows) = rows_of_quarters(refined);
@@ -343,11 +343,33 @@ impl<I: Index> Task for PoleHull<'_, I> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::extent::Extent;
     use super::super::plan::{NodeId, Plan};
     use super::super::products::{products, refined_points};
+    use super::super::regular::WholeHull;
     use super::super::surface::Surface;
     use super::*;
+    use crate::math::simd::{self, Portable};
     use crate::mesh::shapes;
+
+    /// A point for each number.
+    fn scattered(i: usize) -> Point {
+        Point::new((i as f64).sin(), (1.7 * i as f64).cos(), (0.3 * i as f64).sin())
+    }
+
+    #[test]
+    fn quarters_together_reach_as_far_as_one_by_one() {
+        for n in [3, 5, 6, 24] {
+            let refined: Vec<Point> = (0..1 + 2 * n + N_OUTSIDE).map(scattered).collect();
+            let mut expected = Extent::EMPTY;
+            for quarter in regular_quarters(n) {
+                let hull = simd::run(WholeHull { control: &quarter.map(|i| refined[i]) });
+                hull.iter().for_each(|p| expected.grow(*p));
+            }
+            let (low, high) = hull_of_quarters(Portable, &refined);
+            assert_eq!([Point(low), Point(high)], [expected.low, expected.high], "{n} faces around the apex");
+        }
+    }
 
     #[test]
     fn the_step_gives_what_the_rows_give() {
@@ -361,8 +383,7 @@ mod tests {
                     continue;
                 }
                 n_poles += 1;
-                let at = |i: usize| Point::new((i as f64).sin(), (1.7 * i as f64).cos(), (0.3 * i as f64).sin());
-                let ring: Vec<Point> = (0..plans.n_points(node)).map(at).collect();
+                let ring: Vec<Point> = (0..plans.n_points(node)).map(scattered).collect();
                 let mut expected = vec![Point::ZERO; step.rows.len()];
                 products(plans.rows(), step.rows, &ring, &mut expected);
                 let mut out = vec![Point::ZERO; step.rows.len()];
