@@ -30,7 +30,7 @@ pub(super) struct Memory {
     first_line: NonNull<u8>,
 }
 
-// SAFETY: the memory belongs to this value alone; what is read or written through `line` is argued for by its callers.
+// SAFETY: the memory belongs to this value alone; what is read or written through `start` and `line` is argued for by their callers.
 unsafe impl Send for Memory {}
 // SAFETY: as above; `&Memory` only gives out a pointer.
 unsafe impl Sync for Memory {}
@@ -82,7 +82,7 @@ impl Memory {
     #[inline(always)]
     pub(super) unsafe fn line(&self, idx: usize) -> *mut u8 {
         // SAFETY: inside the allocation by the caller's promise.
-        unsafe { self.first_line.as_ptr().add(idx * LINE) }
+        unsafe { self.start().add(idx * LINE) }
     }
 }
 
@@ -118,6 +118,19 @@ mod tests {
             assert_eq!(line.as_ptr().align_offset(LINE), 0);
             assert!(line.iter().all(|&b| b == 0));
         }
+    }
+
+    #[test]
+    fn large_memory_starts_at_a_large_page() {
+        let lines = lines_for(LEAST_HUGE_PAGES * HUGE_PAGE);
+        let memory = Memory::zeroed(lines).unwrap();
+        assert_eq!(memory.start().align_offset(HUGE_PAGE), 0);
+        for idx in [0, lines - 1] {
+            // SAFETY: idx < lines, nobody else knows the memory.
+            let line = unsafe { std::slice::from_raw_parts(memory.line(idx), LINE) };
+            assert!(line.iter().all(|&b| b == 0));
+        }
+        assert!(memory.holds(memory.start().addr()) && Memory::nothing().start().align_offset(LINE) == 0);
     }
 
     #[test]

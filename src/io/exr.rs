@@ -15,7 +15,7 @@ use std::path::Path;
 /// Writes all channels as one part, which every viewer reads: `R`, `G`, `B`, `Z`, `N.X`, ...
 ///
 /// Lossless, one thread, no date: equal pictures give equal files. A part of a picture is the data window, the whole
-/// the display window. Samples are taken from where they are, some rows at a time.
+/// the display window. Samples are taken from where they are, a tile at a time.
 pub fn write_exr(path: &Path, picture: &Channels<'_>) -> Result<()> {
     let channels = picture.channels.iter().map(|(name, samples)| AnyChannel::new(name.as_str(), *samples)).collect();
     let size = Vec2(picture.width, picture.height);

@@ -3,7 +3,7 @@
 //! Numbers are written in the shortest form that reads back as the same `f64`, so a mesh survives the way through a
 //! file bit for bit (an infinite sharpness is written as 10, which means the same).
 
-use super::write::write_whole;
+use super::write::{Output, write_whole};
 use crate::error::Result;
 use crate::ids::VertexId;
 use crate::mesh::{
@@ -11,8 +11,7 @@ use crate::mesh::{
 };
 use glam::DVec3;
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
 
 /// A sink that writes OBJ text.
@@ -23,7 +22,7 @@ pub struct ObjWriter<W> {
 }
 
 /// Creates or replaces the file `path` with what `fill` writes.
-pub fn write_obj(path: &Path, fill: impl FnOnce(&mut ObjWriter<&mut BufWriter<File>>) -> io::Result<()>) -> Result<()> {
+pub fn write_obj(path: &Path, fill: impl FnOnce(&mut ObjWriter<&mut Output>) -> io::Result<()>) -> Result<()> {
     write_whole(path, |out| fill(&mut ObjWriter::new(out)))
 }
 

@@ -6,13 +6,13 @@
 
 use crate::error::{Error, Result};
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Creates or replaces `path` with what `fill` writes.
 ///
 /// A device or pipe (`/dev/stdout`) cannot be renamed over and is written to directly.
-pub fn write_whole(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
+pub fn write_whole(path: &Path, fill: impl FnOnce(&mut Output) -> io::Result<()>) -> Result<()> {
     let failed = |e| Error::io("write", path, e);
     let target = target_of(path);
     match fs::metadata(&target) {
@@ -60,19 +60,62 @@ pub fn target_of(path: &Path) -> PathBuf {
     }
 }
 
-fn write_direct(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
-    let mut out = BufWriter::new(File::options().write(true).open(path)?);
-    fill(&mut out)?;
-    out.flush()
+fn write_direct(path: &Path, fill: impl FnOnce(&mut Output) -> io::Result<()>) -> io::Result<()> {
+    fill_file(File::options().write(true).open(path)?, fill)
 }
 
-fn write_and_rename(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+fn write_and_rename(path: &Path, fill: impl FnOnce(&mut Output) -> io::Result<()>) -> io::Result<()> {
     let temporary = temporary_beside(path)?;
     let (file, temporary) = temporary.into_parts();
-    let mut out = BufWriter::new(file);
+    fill_file(file, fill)?;
+    temporary.persist(path).map_err(|e| e.error)
+}
+
+fn fill_file(file: File, fill: impl FnOnce(&mut Output) -> io::Result<()>) -> io::Result<()> {
+    let mut out = BufWriter::new(Watched { file, error: None });
     fill(&mut out)?;
     out.flush()?;
-    temporary.persist(path).map_err(|e| e.error)
+    out.get_mut().error.take().map_or(Ok(()), Err)
+}
+
+/// What is written to.
+pub type Output = BufWriter<Watched>;
+
+/// A file that remembers the first error of writing to it: encoders may drop one, of what they write when they end.
+pub struct Watched {
+    file: File,
+    error: Option<io::Error>,
+}
+
+impl Watched {
+    fn watch<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
+        if let Err(error) = &result
+            && error.kind() != io::ErrorKind::Interrupted
+        {
+            let copy = || error.raw_os_error().map_or_else(|| error.kind().into(), io::Error::from_raw_os_error);
+            self.error.get_or_insert_with(copy);
+        }
+        result
+    }
+}
+
+impl Write for Watched {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let result = self.file.write(bytes);
+        self.watch(result)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let result = self.file.flush();
+        self.watch(result)
+    }
+}
+
+impl Seek for Watched {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let result = self.file.seek(to);
+        self.watch(result)
+    }
 }
 
 fn temporary_beside(path: &Path) -> io::Result<tempfile::NamedTempFile> {
@@ -108,6 +151,17 @@ mod tests {
         assert!(error.unwrap_err().to_string().contains("disk on fire"));
         assert_eq!(fs::read(&path).unwrap(), b"first");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn an_error_that_an_encoder_drops_is_told() {
+        let full = write_whole(Path::new("/dev/full"), |out| {
+            // More than is held back, so that nothing is left for the end.
+            let _ = out.write_all(&[0; 1 << 16]);
+            Ok(())
+        });
+        assert!(full.unwrap_err().to_string().starts_with("cannot write /dev/full: "));
     }
 
     #[test]

@@ -31,10 +31,10 @@ const BYTES_PER_RING_POINT: usize = 24 << 10;
 /// Points of a ring that a worker has room for anyway.
 const ORDINARY_RING: usize = 64;
 
-/// Pixels of the film that the encoder of EXR files takes at once: a tile. That of PNG files takes a row.
-const WRITTEN_AT_ONCE: u64 = 256 * 256;
+/// Side of the tiles of which the encoder of EXR files takes one at a time. That of PNG files takes a row.
+const WRITTEN_SIDE: u32 = 256;
 
-/// Forms of these pixels that are there at the same time: 4 times their bytes were allocated with all AOVs, 3 without.
+/// Forms of its pixels that are there at the same time: 4 times their bytes were allocated with all AOVs, 3 without.
 const FORMS_OF_WRITTEN: u64 = 4;
 
 /// Bytes for everything too small to be counted: progress bar, statistics, code that was not run yet.
@@ -65,8 +65,9 @@ impl RenderNeeds {
         let of_rings = BYTES_PER_RING_POINT * largest_ring.saturating_sub(ORDINARY_RING);
         let workers = ((WORKER_BYTES + of_rings) * threads) as u64;
         let groups = group_bytes(settings, threads) as u64;
-        let n_tiles = (settings.window.n_pixels() as u64).div_ceil(WRITTEN_AT_ONCE).max(1);
-        let writing = FORMS_OF_WRITTEN * film.div_ceil(n_tiles);
+        let window = settings.window;
+        let tile = [window.width(), window.height()].map(|side| u64::from(side.min(WRITTEN_SIDE)));
+        let writing = FORMS_OF_WRITTEN * film.div_ceil((window.n_pixels() as u64).max(1)) * tile[0] * tile[1];
         Self { resident, tables: tables as u64, film, workers, groups, writing }
     }
 

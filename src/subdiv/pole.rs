@@ -237,7 +237,7 @@ pub(super) struct PoleHull<'a, I> {
 fn rows_of_quarters<T>(refined: &[T]) -> ([&T; 4], [[&T; 5]; 4]) {
     let (inner, outside) = refined.split_last_chunk::<N_OUTSIDE>().expect("a pole's refined points");
     let (first, last) = (inner.first_chunk::<6>(), inner.last_chunk::<2>());
-    let (f, l, o) = (first.expect("two faces"), last.expect("two faces"), outside);
+    let (f, l, o) = (first.expect("three faces"), last.expect("three faces"), outside);
     let rows = [
         [&f[5], &f[0], &f[1], &o[1], &o[8]],
         [&f[4], &f[3], &f[2], &o[2], &o[9]],
