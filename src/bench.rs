@@ -192,13 +192,13 @@ impl BenchSettings {
 }
 
 /// Counts passes, for whoever waits.
-struct Passes<'p> {
+struct Counter<'p> {
     n_done: Cell<usize>,
     n: usize,
     report: &'p dyn Fn(usize, usize),
 }
 
-impl Passes<'_> {
+impl Counter<'_> {
     fn done(&self) {
         self.n_done.set(self.n_done.get() + 1);
         (self.report)(self.n_done.get(), self.n);
@@ -208,7 +208,7 @@ impl Passes<'_> {
 /// The rays of the recipe and their results.
 pub struct Bench<'p> {
     settings: BenchSettings,
-    passes: Passes<'p>,
+    counter: Counter<'p>,
     camera: Camera,
     tiles: Vec<PixelRect>,
     eye: DVec3,
@@ -239,7 +239,7 @@ impl<'p> Bench<'p> {
         let n = PixelRect::whole(settings.size).n_pixels();
         let mut bench = Self {
             settings,
-            passes: Passes { n_done: Cell::new(0), n: settings.n_passes(), report: progress },
+            counter: Counter { n_done: Cell::new(0), n: settings.n_passes(), report: progress },
             camera: *camera,
             tiles: PixelRect::whole(settings.size).blocks([TILE; 2]).collect(),
             eye: camera.eye().as_vec3().as_dvec3(),
@@ -274,7 +274,7 @@ impl<'p> Bench<'p> {
         if self.settings.passes[1] || self.settings.passes[2] {
             self.run_secondary(&make_tracer, &mut result);
         }
-        debug_assert_eq!(self.passes.n_done.get(), self.passes.n, "passes are counted in advance");
+        debug_assert_eq!(self.counter.n_done.get(), self.counter.n, "passes are counted in advance");
         result
     }
 
@@ -302,7 +302,7 @@ impl<'p> Bench<'p> {
         result: &mut BenchResult,
     ) {
         let (tiles, camera, eye, settings) = (&self.tiles, &self.camera, self.eye, &self.settings);
-        let passes = &self.passes;
+        let counter = &self.counter;
         let directions = split(&self.primary, tiles);
         let mut hits: Vec<_> = split_mut(&mut self.hits, tiles);
         let mut pass = |threads| {
@@ -318,9 +318,9 @@ impl<'p> Bench<'p> {
             })
         };
         result.first_pass_s = pass(settings.threads).0;
-        passes.done();
+        counter.done();
         if settings.passes[0] {
-            result.primary = Some(measure(settings, passes, self.primary.len(), &mut pass));
+            result.primary = Some(measure(settings, counter, self.primary.len(), &mut pass));
         }
         let hits = self.order.iter().map(|&place| &self.hits[place]).filter(|h| h.t < f32::INFINITY);
         let (n, sum) = hits.fold((0, 0.0), |(n, sum), h| (n + 1, sum + f64::from(h.t)));
@@ -348,8 +348,8 @@ impl<'p> Bench<'p> {
             }),
         };
         result.ao_first_s = pass(self.settings.threads).0;
-        self.passes.done();
-        result.ao = Some(measure(&self.settings, &self.passes, rays.len(), &mut pass));
+        self.counter.done();
+        result.ao = Some(measure(&self.settings, &self.counter, rays.len(), &mut pass));
         result.ao_rays = rays.len();
         result.ao_occluded = share(&occluded);
     }
@@ -364,7 +364,7 @@ impl<'p> Bench<'p> {
             return self.run_diffuse_in_batches(make_tracer, &rays, is_hit);
         }
         let mut chunks: Vec<&mut [bool]> = is_hit.chunks_mut(CHUNK).collect();
-        measure(&self.settings, &self.passes, rays.len(), &mut |threads| {
+        measure(&self.settings, &self.counter, rays.len(), &mut |threads| {
             parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
                 for (ray, out) in rays[chunk * CHUNK..].iter().zip(out.iter_mut()) {
                     *out = tracer.closest(&ray.ray()).is_some();
@@ -382,7 +382,7 @@ impl<'p> Bench<'p> {
         let size = self.settings.batch;
         let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
         let mut chunks: Vec<&mut [Option<Hit>]> = hits.chunks_mut(size).collect();
-        let rates = measure(&self.settings, &self.passes, rays.len(), &mut |threads| {
+        let rates = measure(&self.settings, &self.counter, rays.len(), &mut |threads| {
             parallel(threads, make_tracer, &mut chunks, |tracer, chunk, out| {
                 tracer.closest_batch(&rays[chunk * size..][..out.len()], out);
             })
@@ -503,7 +503,7 @@ fn parallel<T, R: Send>(
 
 fn measure(
     settings: &BenchSettings,
-    passes: &Passes<'_>,
+    counter: &Counter<'_>,
     rays: usize,
     pass: &mut impl FnMut(usize) -> (f64, f64),
 ) -> Rates {
@@ -511,7 +511,7 @@ fn measure(
         let (mut wall, mut cpu) = (Vec::new(), Vec::new());
         for _ in 0..settings.repeat {
             let (w, c) = pass(threads);
-            passes.done();
+            counter.done();
             wall.push(w);
             cpu.push(c / threads as f64);
         }
