@@ -22,7 +22,7 @@ use crate::ids::{FaceId, MeshId, PatchId};
 use crate::math::Bounds;
 use crate::scene::camera::Camera;
 use crate::scene::world::{World, WorldMesh};
-use crate::subdiv::{Dicer, PatchRates, SampleKind};
+use crate::subdiv::{AskedCells, Dicer, PatchRates, SampleKind};
 use crate::topology::{HalfEdges, NONE};
 use glam::DVec3;
 
@@ -433,7 +433,7 @@ fn part_box(
     // A part's cells are a part of the patch: as many splits lead to a quarter of its size.
     let largest = (i[1] - i[0]).max(j[1] - j[0]);
     let depth = (rates.n_u.max(rates.n_v) / largest).ilog2() + BOX_DEPTH;
-    dicer.bounds(mesh.surface(), patch, rates, i, j, depth)
+    dicer.bounds(mesh.surface(), patch, AskedCells { rates, i, j, depth })
 }
 
 fn is_in_cell(i: [u32; 2], j: [u32; 2]) -> bool {

@@ -9,7 +9,7 @@ use crate::grid::{
 };
 use crate::ids::{MeshId, PatchId};
 use crate::math::{Envelope, LatticeGrid};
-use crate::subdiv::{Dicer, EqualParts, PatchRates, snapped};
+use crate::subdiv::{AskedCells, Dicer, EqualParts, PatchRates, snapped};
 
 /// Children of a node along u and v.
 pub(super) const NODE_SIDE: u32 = 4;
@@ -205,7 +205,7 @@ impl<'w> Builder<'w> {
             let [i, j] = ranges(child);
             self.envelopes.push(match surface.edited().hide_cells(of.patch, rates, i, j) {
                 true => Envelope::EMPTY,
-                false => self.dicer.envelope(surface, of.patch, rates, i, j, depth),
+                false => self.dicer.envelope(surface, of.patch, AskedCells { rates, i, j, depth }),
             });
         }
         [n_u as u8, n_v as u8]

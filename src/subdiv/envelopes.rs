@@ -23,51 +23,48 @@ pub struct EqualParts {
     pub side: u32,
 }
 
+/// Cells of a patch of which is asked what holds them.
+#[derive(Clone, Copy, Debug)]
+pub struct AskedCells<'a> {
+    /// Of the patch.
+    pub rates: &'a PatchRates,
+    /// Columns, from the first to before the last.
+    pub i: [u32; 2],
+    /// Rows.
+    pub j: [u32; 2],
+    /// Splits towards irregular corners: more of them make it tighter.
+    pub depth: u32,
+}
+
+impl AskedCells<'_> {
+    /// Their parameters along u and v.
+    fn ranges(&self) -> [[f64; 2]; 2] {
+        [range(self.i, self.rates.n_u), range(self.j, self.rates.n_v)]
+    }
+}
+
 impl Dicer {
-    /// What holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing; `depth` more
-    /// splits towards irregular corners make it tighter. The plate is across the normal in the middle of the cells.
-    pub fn envelope(
-        &mut self,
-        surface: &Surface,
-        patch: PatchId,
-        rates: &PatchRates,
-        i: [u32; 2],
-        j: [u32; 2],
-        depth: u32,
-    ) -> Envelope {
+    /// What holds every lattice vertex [`dice`](Self::dice) would give for these cells, without dicing. The plate is
+    /// across the normal in the middle of the cells.
+    pub fn envelope(&mut self, surface: &Surface, patch: PatchId, cells: AskedCells<'_>) -> Envelope {
         let lane = self.load(surface, patch);
-        let [u, v] = [range(i, rates.n_u), range(j, rates.n_v)];
+        let [u, v] = cells.ranges();
         let normal = surface.normal_of_part(&mut self.points[lane], &mut self.evaluator, u, v);
-        in_lattice(normal, &self.extent(surface, patch, rates, normal, [i, j], depth))
+        in_lattice(normal, &self.extent(surface, patch, cells, normal))
     }
 
     /// The box of [`envelope`](Self::envelope) alone.
-    pub fn bounds(
-        &mut self,
-        surface: &Surface,
-        patch: PatchId,
-        rates: &PatchRates,
-        i: [u32; 2],
-        j: [u32; 2],
-        depth: u32,
-    ) -> Bounds {
-        to_lattice_box(&self.extent(surface, patch, rates, [0; 3], [i, j], depth))
+    pub fn bounds(&mut self, surface: &Surface, patch: PatchId, cells: AskedCells<'_>) -> Bounds {
+        to_lattice_box(&self.extent(surface, patch, cells, [0; 3]))
     }
 
     /// How far cells reach, and how high along a normal, where sides move their vertices to, too.
-    fn extent(
-        &mut self,
-        surface: &Surface,
-        patch: PatchId,
-        rates: &PatchRates,
-        normal: [i8; 3],
-        [i, j]: [[u32; 2]; 2],
-        depth: u32,
-    ) -> Extent {
+    fn extent(&mut self, surface: &Surface, patch: PatchId, cells: AskedCells<'_>, normal: [i8; 3]) -> Extent {
+        let AskedCells { rates, i, j, depth } = cells;
         let lane = self.load(surface, patch);
         let points = &mut self.points[lane];
-        let (u, v) = (range(i, rates.n_u), range(j, rates.n_v));
-        let mut extent = surface.extent(points, &mut self.evaluator, AskedPart { range: [u, v], normal, depth });
+        let mut extent =
+            surface.extent(points, &mut self.evaluator, AskedPart { range: cells.ranges(), normal, depth });
         let snap = |[a, b]: [u32; 2], n: u32, r: u32| range([snapped(a, n, r), snapped(b, n, r)], r);
         for side in 0..4 {
             let (touches, n, along) = match side {
@@ -226,7 +223,8 @@ mod tests {
                 let cells = [[0, rates.n_u], [0, rates.n_v]];
                 n += check(&mut dicer, &surface, patch, &rates, cells, whole);
                 assert_eq!(whole, dicer.patch_envelope(&surface, patch, 3));
-                let part = dicer.envelope(&surface, patch, &rates, cells[0], cells[1], 0);
+                let part = AskedCells { rates: &rates, i: cells[0], j: cells[1], depth: 0 };
+                let part = dicer.envelope(&surface, patch, part);
                 check(&mut dicer, &surface, patch, &rates, cells, part);
             }
         }
@@ -262,7 +260,7 @@ mod tests {
                 let rates = PatchRates::new([0, 1, 2, 3].map(|side| [8, 3, 1, 5][(patch.idx() / (side + 1)) % 4]), 1);
                 let cut = |n: u32| [[0, n.div_ceil(2)], [n / 2, n]];
                 for (i, j) in cut(rates.n_u).into_iter().flat_map(|i| cut(rates.n_v).map(|j| (i, j))) {
-                    let alone = dicer.envelope(&surface, patch, &rates, i, j, 2);
+                    let alone = dicer.envelope(&surface, patch, AskedCells { rates: &rates, i, j, depth: 2 });
                     check(&mut dicer, &surface, patch, &rates, [i, j], alone);
                     n[0] += 1;
                 }

@@ -52,7 +52,7 @@ mod stencils;
 pub mod surface;
 
 pub use dice::Dicer;
-pub use envelopes::EqualParts;
+pub use envelopes::{AskedCells, EqualParts};
 pub use eval::{Evaluator, SampleKind, SurfaceSample};
 pub use plan::{NodeId, PlanLibrary};
 pub use rates::{MAX_RATE, PatchRates, snapped};
