@@ -30,7 +30,8 @@ pub(super) struct Memory {
     first_line: NonNull<u8>,
 }
 
-// SAFETY: the memory belongs to this value alone; what is read or written through `start` and `line` is argued for by their callers.
+// SAFETY: the memory belongs to this value alone; what is read or written through `start` and `line` is argued for by
+// their callers.
 unsafe impl Send for Memory {}
 // SAFETY: as above; `&Memory` only gives out a pointer.
 unsafe impl Sync for Memory {}

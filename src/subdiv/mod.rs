@@ -22,9 +22,11 @@
 //!    rounding to the lattice with that guard makes shared borders equal to the bit.
 //!
 //! Sources: Catmull & Clark 1978; Stam 1998; Nießner et al. 2012; Brainerd et al. 2016 (plans); OpenSubdiv's rules.
-//! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`rates`], [`dice`], [`edits`]. [`refine`] is the slow
-//! reference. What most irregular patches come to is written out: one step and boxes around a lone extraordinary vertex
-//! in `pole`, the points beside it in `stencils`. `kinds` finds the faces that share a plan, by the `fans` at their
+//! Read [`local`] first, then [`rules`], [`plan`], [`eval`], [`surface`], [`rates`], [`dice`], [`edits`]. [`refine`] is
+//! the slow reference. What most irregular patches come to is written out: one step and boxes around a lone
+//! extraordinary vertex in `pole`, the points beside it in `stencils`.
+//!
+//! `kinds` finds the faces that share a plan, by the `fans` at their
 //! corners if it can, and has their nodes drafted (`draft`); `route` finds the vertices of a ring whose plan is known.
 
 mod bounds;

@@ -270,8 +270,8 @@ fn joined(rows: [[&usize; 4]; 4]) -> [usize; 16] {
     std::array::from_fn(|i| *rows[i / 4][i % 4])
 }
 
-/// The box of the Bézier points of a pole's regular quarters. Quarters side by side have those of their border in common,
-/// and of the control points of a row or a column all but one.
+/// The box of the Bézier points of a pole's regular quarters. Quarters side by side have those of their border in
+/// common, and of the control points of a row or a column all but one.
 #[inline(always)]
 fn hull_of_quarters<K: Kernel>(k: K, refined: &[Point]) -> (K::D, K::D) {
     let (below, rows) = rows_of_quarters(refined);

@@ -46,11 +46,11 @@ const JITTER_STEPS: f32 = 1.0;
 /// points on a line have an area then.
 const WIDENING_STEPS: f32 = 16.0;
 
-/// Patches up to which a tree is built thoroughly. That takes 8 % of the instructions of preparing trex (11,946 patches),
-/// and rays visit 1 to 5 % less afterwards. When nodes were put in their places twice, with 38,000 to 47,000 patches (a
-/// crowd, a ground, a scan of 30,000 faces, rates 8 and 16) it made preparing take 1.04 to 1.5 times as long, and
-/// occlusion, diffuse and shuffled rays 1.00 to 1.11 times as fast. Beside the 0.62 s of a ground of two million patches
-/// it would have taken 0.29 more.
+/// Patches up to which a tree is built thoroughly. That takes 8 % of the instructions of preparing trex (11,946
+/// patches), and rays visit 1 to 5 % less afterwards. When nodes were put in their places twice, with 38,000 to 47,000
+/// patches (a crowd, a ground, a scan of 30,000 faces, rates 8 and 16) it made preparing take 1.04 to 1.5 times as
+/// long, and occlusion, diffuse and shuffled rays 1.00 to 1.11 times as fast. Beside the 0.62 s of a ground of two
+/// million patches it would have taken 0.29 more.
 const MOST_THOROUGH: usize = 1 << 16;
 
 /// The stack that a tree of a part needs if all went well, and more: of trex 50.
